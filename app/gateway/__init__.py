@@ -1,0 +1,1 @@
+"""The web server: sessions, REST, pictures, 3D view; wires the other packages together."""

@@ -1,0 +1,1 @@
+"""The gesture database: records, store, enrolment, import and export."""

@@ -1,0 +1,1 @@
+"""What crosses between the gateway and a robot node, and its two ends over Zenoh."""

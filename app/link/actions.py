@@ -1,0 +1,121 @@
+"""Actions: what a gesture makes the robot do.
+
+One discriminated union, the same over REST, in the gesture database, in the exchange format and
+on the link to the robot node. Bounds here only keep out nonsense; the robot node clips every
+motion to the limits of its own arm and reports what it really did.
+"""
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
+
+MAX_JOINT_SPEED = 4.3
+"""rad/s; the fastest joint of the PUMA 560 (joint 5) turns at 241 degrees/s."""
+MAX_LINEAR_SPEED = 1.0
+"""m/s, per axis."""
+MAX_ANGULAR_SPEED = 3.15
+"""rad/s, per axis."""
+MAX_STEPS = 32
+"""Steps of one sequence."""
+
+
+class _Action(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+Duration = Annotated[
+    float | None,
+    Field(
+        default=None,
+        gt=0,
+        le=60,
+        description="s; how long to move. Only inside a sequence, where it is required.",
+    ),
+]
+LinearSpeed = Annotated[float, Field(ge=-MAX_LINEAR_SPEED, le=MAX_LINEAR_SPEED)]
+AngularSpeed = Annotated[float, Field(ge=-MAX_ANGULAR_SPEED, le=MAX_ANGULAR_SPEED)]
+
+
+class JogJoint(_Action):
+    """Turn one joint at a constant speed while the gesture is held."""
+
+    type: Literal["jog_joint"] = "jog_joint"
+    joint: int = Field(ge=1, le=6, description="1 is the joint at the base.")
+    velocity: float = Field(ge=-MAX_JOINT_SPEED, le=MAX_JOINT_SPEED, description="rad/s")
+    duration: Duration = None
+
+
+class JogCartesian(_Action):
+    """Move the tool in a straight line, or turn it, while the gesture is held."""
+
+    type: Literal["jog_cartesian"] = "jog_cartesian"
+    frame: Literal["base", "tool"] = "base"
+    linear: tuple[LinearSpeed, LinearSpeed, LinearSpeed] = Field(
+        default=(0.0, 0.0, 0.0), description="m/s along x, y, z of the frame"
+    )
+    angular: tuple[AngularSpeed, AngularSpeed, AngularSpeed] = Field(
+        default=(0.0, 0.0, 0.0), description="rad/s about x, y, z of the frame"
+    )
+    duration: Duration = None
+
+
+class TurnJoint(_Action):
+    """Turn one joint by an exact angle. Ends there; letting go before stops it on the way."""
+
+    type: Literal["turn_joint"] = "turn_joint"
+    joint: int = Field(ge=1, le=6, description="1 is the joint at the base.")
+    angle: float = Field(ge=-6.3, le=6.3, description="rad, relative to where the joint is")
+
+
+class Pose(_Action):
+    """Go to a named pose of the robot. Ends there; letting go before stops it on the way."""
+
+    type: Literal["pose"] = "pose"
+    name: str = Field(min_length=1, max_length=40, pattern=r"^[a-z0-9_-]+$")
+
+
+class Gripper(_Action):
+    """Open or close the gripper to a width."""
+
+    type: Literal["gripper"] = "gripper"
+    width: float = Field(ge=0.0, le=0.2, description="m between the fingers; 0 is closed")
+
+
+class Home(_Action):
+    """Go to the robot's home pose. Ends there; letting go before stops it on the way."""
+
+    type: Literal["home"] = "home"
+
+
+class Stop(_Action):
+    """The latched stop (category S1). Needs no lease and no armed robot."""
+
+    type: Literal["stop"] = "stop"
+
+
+Step = Annotated[
+    JogJoint | JogCartesian | TurnJoint | Pose | Gripper | Home | Stop,
+    Field(discriminator="type"),
+]
+
+
+class Sequence(_Action):
+    """Actions one after another, for as long as the gesture is held."""
+
+    type: Literal["sequence"] = "sequence"
+    steps: tuple[Step, ...] = Field(min_length=1, max_length=MAX_STEPS)
+
+    @model_validator(mode="after")
+    def _jogs_end(self) -> "Sequence":
+        for number, step in enumerate(self.steps, start=1):
+            if isinstance(step, JogJoint | JogCartesian) and step.duration is None:
+                raise ValueError(f"step {number} ({step.type}) needs a duration in seconds")
+        return self
+
+
+Action = Annotated[
+    JogJoint | JogCartesian | TurnJoint | Pose | Gripper | Home | Stop | Sequence,
+    Field(discriminator="type"),
+]
+ACTION: TypeAdapter[Action] = TypeAdapter(Action)
+"""Validates and serialises any action: ``ACTION.validate_json(b'{"type": "home"}')``."""

@@ -1,0 +1,1 @@
+"""The simulated arm. The only folder that imports pybullet."""
