@@ -1,5 +1,169 @@
-"""The command line."""
+"""The command line: one short function a command; the work is done elsewhere.
+
+Every error of this project ends as one line on standard error and exit code 1; a wrong option as
+the option's own message and exit code 2. Parts are imported by the command that needs them, so
+that ``farhand gestures list`` does not wait for PyBullet.
+"""
+
+import json
+import logging
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from pydantic import ValidationError
+
+from app.cli_gestures import draw_starter_set, enrol, gestures_app, settings_for
+from app.errors import FarhandError
+
+app = typer.Typer(
+    name="farhand",
+    help="Drive a robot arm that stands somewhere else by showing hand gestures to a webcam.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+app.add_typer(gestures_app, name="gestures")
+app.command("enroll")(enrol)
+gestures_app.command("draw")(draw_starter_set)
+
+DataDir = Annotated[
+    Path | None, typer.Option(help="Folder for the database, the token and the link.")
+]
+
+
+@app.command()
+def serve(
+    host: Annotated[str | None, typer.Option(help="Address to listen on.")] = None,
+    port: Annotated[int | None, typer.Option(help="Port; 0 picks a free one.")] = None,
+    data_dir: DataDir = None,
+    token: Annotated[
+        str | None, typer.Option(help="Secret that opens the page and the API.")
+    ] = None,
+    tls_cert: Annotated[Path | None, typer.Option(help="Certificate chain (PEM).")] = None,
+    tls_key: Annotated[Path | None, typer.Option(help="Private key (PEM).")] = None,
+    behind_proxy: Annotated[
+        bool | None, typer.Option(help="A proxy in front of this server does HTTPS.")
+    ] = None,
+    robot_endpoint: Annotated[
+        str | None,
+        typer.Option(help="Zenoh endpoint of a robot node that runs elsewhere; starts none here."),
+    ] = None,
+) -> None:
+    """Start the server: the page, the API, the 3D view and a robot node."""
+    from app.gateway.serve import serve as run_server
+
+    given: dict[str, Any] = {
+        "host": host,
+        "port": port,
+        "data_dir": data_dir,
+        "token": token,
+        "tls_cert": tls_cert,
+        "tls_key": tls_key,
+        "behind_proxy": behind_proxy,
+    }
+    if robot_endpoint is not None:
+        given["robot"] = {"spawn": False, "endpoint": robot_endpoint}
+    run_server(settings_for(**given))
+
+
+@app.command()
+def robot(
+    endpoint: Annotated[str, typer.Option(help="Zenoh endpoint to listen on.")],
+    id: Annotated[str, typer.Option(help="Name of the robot on the link.")] = "puma",
+    model: Annotated[str, typer.Option(help="Folder under app/robot/models/.")] = "puma560",
+    latch: Annotated[
+        Path | None, typer.Option(help="File that keeps a latched stop over a restart.")
+    ] = None,
+) -> None:
+    """Start a robot node by itself, for a gateway that runs elsewhere."""
+    from app.robot.node import NodeSettings, run_node
+
+    run_node(NodeSettings(id=id, model=model, endpoint=endpoint, latch=latch))
+
+
+@app.command()
+def evaluate(
+    directory: Annotated[Path, typer.Argument(help="Folder that holds LABEL/*.jpg.")],
+    shots: Annotated[int, typer.Option(min=1, help="Images a label to enrol.")] = 1,
+    trials: Annotated[int, typer.Option(min=1, help="How often to draw them anew.")] = 10,
+    seed: Annotated[int, typer.Option(help="Seed of the drawing.")] = 0,
+    reject: Annotated[bool, typer.Option(help="Allow the answer 'unknown'.")] = False,
+    unknown: Annotated[
+        Path | None, typer.Option(help="Folder of labels that are never enrolled.")
+    ] = None,
+    json_to: Annotated[
+        Path | None, typer.Option("--json", help="Write JSON to a file, or to - for stdout.")
+    ] = None,
+) -> None:
+    """Enrol some images of a folder at random and recognise the rest."""
+    from app.pipeline.evaluate import evaluate as run
+
+    result = run(
+        directory,
+        shots=shots,
+        trials=trials,
+        seed=seed,
+        reject=reject,
+        unknown=unknown,
+        settings=settings_for().pipeline,
+    )
+    text = json.dumps(result, indent=2)
+    if json_to is not None and str(json_to) != "-":
+        json_to.write_text(text + "\n")
+        accuracy = result["accuracy"]
+        print(f"accuracy {accuracy['mean']:.3f} ± {accuracy['std']:.3f}; written to {json_to}")
+    else:
+        print(text)
+
+
+@app.command()
+def replay(
+    source: Annotated[Path, typer.Argument(help="A video file, or a folder of images.")],
+    data_dir: DataDir = None,
+) -> None:
+    """Send a video or an image folder through the pipeline; print events as JSON lines."""
+    from app.cli_gestures import open_store
+    from app.gateway.gallery import build_matcher
+    from app.pipeline import Pipeline
+    from app.pipeline.replay import replay as run
+
+    settings = settings_for(data_dir=data_dir)
+    store = open_store(settings)
+    try:
+        matcher = build_matcher(store, settings.pipeline)
+    finally:
+        store.close()
+    for record in run(source, Pipeline(settings.pipeline, matcher)):
+        print(json.dumps(record), flush=True)
+
+
+@app.command()
+def doctor(data_dir: DataDir = None, port: int | None = None) -> None:
+    """Check what Farhand needs on this machine, and say how to mend what is wrong."""
+    from app.doctor import run_checks
+
+    if not run_checks(settings_for(data_dir=data_dir, port=port)):
+        raise typer.Exit(1)
 
 
 def main() -> None:
-    """Run the command line."""
+    """Run the command line; turn this project's errors into one line and exit code 1."""
+    logging.basicConfig(
+        level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(levelname)s %(message)s"
+    )
+    try:
+        app()
+    except FarhandError as error:
+        print(f"farhand: {error.message}", file=sys.stderr)
+        sys.exit(1)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        print(f"farhand: {where}: {first['msg']}", file=sys.stderr)
+        sys.exit(1)
+    except BrokenPipeError:
+        # Whoever read our output has gone: `farhand replay … | head`.
+        sys.stderr.close()
+        sys.exit(1)
