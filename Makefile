@@ -41,7 +41,7 @@ $(SETUP): requirements.lock requirements-dev.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || \
 		{ echo "Farhand needs Python 3.11 (PyBullet has no wheels for newer ones); set PYTHON=/path/to/python3.11" >&2; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	awk '/^[a-z]/ {uv = /^uv==/} uv' requirements.lock > .venv/uv.lock
+	awk '/^[a-z]/ {uv = /^uv==/} uv' requirements-dev.lock > .venv/uv.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --no-deps -r .venv/uv.lock
 	$(BIN)/uv pip install --quiet --python $(BIN)/python --require-hashes --no-deps \
 		-r requirements.lock -r requirements-dev.lock
