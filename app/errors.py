@@ -17,6 +17,7 @@
     └── WorldError                the world did something wrong (HTTP 5xx, or exit code 1)
         ├── RobotUnavailable      the robot node does not answer
         ├── DatabaseBroken        the gesture database cannot be read
+        ├── StorageFull           no space left to write to
         ├── CannotStart           a port, folder or model that is needed is missing or taken
         └── LinkFailed            the link between gateway and node cannot be opened
 
@@ -141,6 +142,13 @@ class DatabaseBroken(WorldError):
     """The gesture database cannot be read."""
 
     default_code = "database_broken"
+
+
+class StorageFull(WorldError):
+    """No space is left to write to; what was asked for has not happened."""
+
+    default_code = "disk_full"
+    status = 507
 
 
 class CannotStart(WorldError):

@@ -1,0 +1,45 @@
+"""Taking gestures out of a database, and into it, in the exchange format of setfile.py."""
+
+from pathlib import Path
+
+from app.gestures.records import Gesture, NewGesture
+from app.gestures.setfile import read_set, write_set
+from app.gestures.store import GestureStore
+
+
+def export_set(store: GestureStore, target: Path) -> int:
+    """Write all gestures to a new folder, or to a new file when ``target`` ends in ``.zip``.
+
+    Returns:
+        How many gestures were written.
+
+    Raises:
+        Invalid: the target exists and is not an empty folder.
+    """
+    gestures = store.list()
+    write_set(
+        (
+            NewGesture(
+                gesture.name, gesture.action, tuple(sample.template for sample in gesture.samples)
+            )
+            for gesture in gestures
+        ),
+        target,
+    )
+    return len(gestures)
+
+
+def import_set(store: GestureStore, source: Path, replace: bool = False) -> list[Gesture]:
+    """Take all gestures of a folder or zip file into a database: all of them, or none.
+
+    Args:
+        store: Where to.
+        source: A set in the exchange format.
+        replace: Gestures whose names are taken get the set's action and samples and keep their
+            ids; gestures that are not in the set stay as they are.
+
+    Raises:
+        Invalid: the set is not exactly in the format.
+        Duplicate: a name is taken, and ``replace`` is off.
+    """
+    return store.put_all(read_set(source), replace=replace)

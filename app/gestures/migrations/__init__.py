@@ -1,0 +1,1 @@
+"""How an older gesture database becomes today's: one script a step, run by alembic."""

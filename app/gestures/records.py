@@ -1,0 +1,117 @@
+"""What the gesture database holds, as plain immutable records, and the rules for their values."""
+
+import unicodedata
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+from app.errors import Invalid
+from app.link.actions import Action
+
+TEMPLATE_WIDTH = 60
+TEMPLATE_HEIGHT = 80
+TEMPLATE_BYTES = TEMPLATE_WIDTH * TEMPLATE_HEIGHT // 8
+"""600 bytes: 80 rows of 60 pixels, one bit a pixel, row after row, first pixel in the highest bit
+(the order of :func:`numpy.packbits`). 1 is the hand."""
+NAME_MAX = 60
+"""Characters of a gesture's name."""
+MAX_GESTURES = 500
+MAX_SAMPLES = 1000
+"""Samples of one gesture."""
+
+_JOINERS = "\u200c\u200d"
+"""Not printable by Unicode's book, but part of Persian words and of many emoji."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One enrolled picture of a gesture, as its template."""
+
+    id: str
+    template: bytes
+    """600 bytes, see :data:`TEMPLATE_BYTES`."""
+    created: datetime
+    """UTC, in steps of a millisecond."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gesture:
+    """A name, what it makes the robot do, and what it looks like."""
+
+    id: str
+    name: str
+    action: Action
+    samples: tuple[Sample, ...]
+    """In the order in which they were enrolled; at least one."""
+    created: datetime
+    updated: datetime
+    """UTC, in steps of a millisecond."""
+
+
+def clean_name(name: str) -> str:
+    """The form in which a name is kept: Unicode NFC, without white space at its ends.
+
+    Raises:
+        Invalid: empty, longer than 60 characters, or with characters that cannot be seen.
+    """
+    clean = unicodedata.normalize("NFC", name).strip()
+    if not clean:
+        raise Invalid("a gesture needs a name: 1 to 60 characters", field="name", given=name)
+    if len(clean) > NAME_MAX:
+        raise Invalid(
+            f"the name has {len(clean)} characters; at most {NAME_MAX} are allowed",
+            field="name",
+            length=len(clean),
+        )
+    for character in clean:
+        if not character.isprintable() and character not in _JOINERS:
+            raise Invalid(
+                f"the name holds the character U+{ord(character):04X}, which cannot be printed; "
+                "use letters, digits, signs and spaces",
+                field="name",
+                character=f"U+{ord(character):04X}",
+            )
+    if not any(unicodedata.category(character)[0] in "LNPS" for character in clean):
+        raise Invalid("the name holds nothing that can be seen", field="name")
+    return clean
+
+
+def name_key(name: str) -> str:
+    """What two names are compared by: equal keys count as the same name (``Up`` and ``UP``)."""
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
+
+
+def check_templates(templates: Sequence[bytes]) -> tuple[bytes, ...]:
+    """The templates as a tuple, once each of them is known to be one.
+
+    Raises:
+        Invalid: none given, a wrong length, or a template that is empty or full.
+    """
+    if not templates:
+        raise Invalid("a gesture needs at least one picture", field="templates")
+    if len(templates) > MAX_SAMPLES:
+        raise Invalid(
+            f"{len(templates)} samples given; a gesture may have {MAX_SAMPLES}", field="templates"
+        )
+    for number, template in enumerate(templates, start=1):
+        if len(template) != TEMPLATE_BYTES:
+            raise Invalid(
+                f"template {number} has {len(template)} bytes; 60x80 pixels, one bit each, are "
+                f"{TEMPLATE_BYTES}",
+                field="templates",
+                length=len(template),
+            )
+        if not any(template) or all(byte == 0xFF for byte in template):
+            raise Invalid(
+                f"template {number} is one colour all over; it shows no hand", field="templates"
+            )
+    return tuple(bytes(template) for template in templates)
+
+
+@dataclass(frozen=True, slots=True)
+class NewGesture:
+    """A gesture that is not in a database yet, such as one read from an exchange folder."""
+
+    name: str
+    action: Action
+    templates: tuple[bytes, ...]

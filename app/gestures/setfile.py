@@ -1,0 +1,276 @@
+"""The exchange format: a folder, or a zip of one, with ``gestures.toml`` and one-bit PNG files.
+
+::
+
+    format = 1
+
+    [[gesture]]
+    name = "forward"
+    action = { type = "jog_cartesian", frame = "base", linear = [0.1, 0.0, 0.0] }
+    samples = ["forward/01.png", "forward/02.png"]
+
+Sample paths are relative to ``gestures.toml``, with forward slashes, and stay below it. Actions
+are those of :mod:`app.link.actions`. Nothing else is allowed: what is misspelt is refused, not
+ignored.
+"""
+
+import json
+import os
+import re
+import shutil
+import tempfile
+import tomllib
+import unicodedata
+import zipfile
+import zlib
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from pydantic import ValidationError
+
+from app.errors import Invalid
+from app.gestures.png import PNG_MAX_BYTES, read_template, template_png
+from app.gestures.records import (
+    MAX_GESTURES,
+    NewGesture,
+    check_templates,
+    clean_name,
+    name_key,
+)
+from app.link.actions import ACTION, Action
+
+FORMAT = 1
+INDEX = "gestures.toml"
+INDEX_MAX_BYTES = 1 << 20
+ZIP_MAX_BYTES = 64 << 20
+"""Of a zip file, and of everything that is unpacked from it."""
+
+Read = Callable[[str, int], bytes]
+"""Gives the bytes of a file in the set by its path; refuses more than the given number."""
+
+
+def read_set(source: Path) -> list[NewGesture]:
+    """Read a set of gestures from a folder or a zip file.
+
+    Raises:
+        Invalid: missing, damaged, or not exactly in the format; says where and why.
+    """
+    if source.is_dir():
+        return _parse(_folder_reader(source))
+    if not source.exists():
+        raise Invalid(f"{source} does not exist; name a folder with {INDEX} in it, or a zip of one")
+    if source.stat().st_size > ZIP_MAX_BYTES:
+        raise Invalid(f"{source} is larger than {ZIP_MAX_BYTES >> 20} MiB")
+    try:
+        with zipfile.ZipFile(source) as archive:
+            return _parse(_zip_reader(archive))
+    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError) as error:
+        raise Invalid(f"{source} is neither a folder nor a readable zip file: {error}") from error
+
+
+def write_set(gestures: Iterable[NewGesture], target: Path) -> None:
+    """Write a set to a new folder, or to a zip file when ``target`` ends in ``.zip``.
+
+    The same gestures give the same bytes. Whole or not at all: the files are written beside the
+    target and put in place by one renaming.
+
+    Raises:
+        Invalid: the target exists (an empty folder may), or its parent does not.
+        OSError: the disk does not take it.
+    """
+    zipped = target.suffix.lower() == ".zip"
+    if target.exists() and (zipped or not target.is_dir() or any(target.iterdir())):
+        raise Invalid(f"{target} exists already; name a new folder or zip file")
+    if not target.absolute().parent.is_dir():
+        raise Invalid(f"the folder {target.absolute().parent} does not exist; make it first")
+    files = _files(gestures)
+    staging = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.absolute().parent))
+    try:
+        if zipped:
+            path = staging / "set.zip"
+            with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+                for name, data in files.items():
+                    # A fixed time (the format's earliest) keeps equal sets equal to the byte.
+                    archive.writestr(zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0)), data)
+            os.replace(path, target)
+        else:
+            for name, data in files.items():
+                (staging / name).parent.mkdir(exist_ok=True)
+                (staging / name).write_bytes(data)
+            staging.chmod(0o755)
+            os.replace(staging, target)
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+
+
+def _files(gestures: Iterable[NewGesture]) -> dict[str, bytes]:
+    files: dict[str, bytes] = {}
+    index = [f"format = {FORMAT}\n"]
+    taken: set[str] = set()
+    for gesture in gestures:
+        folder = _slug(gesture.name, taken)
+        digits = max(2, len(str(len(gesture.templates))))
+        samples = [f"{folder}/{n:0{digits}}.png" for n in range(1, len(gesture.templates) + 1)]
+        files.update(zip(samples, map(template_png, gesture.templates), strict=True))
+        action = ACTION.dump_python(gesture.action, mode="json", exclude_none=True)
+        index.append(
+            f"\n[[gesture]]\nname = {_toml(gesture.name)}\naction = {_toml(action)}\n"
+            f"samples = [\n{''.join(f'  {_toml(sample)},{chr(10)}' for sample in samples)}]\n"
+        )
+    return {INDEX: "".join(index).encode(), **files}
+
+
+def _slug(name: str, taken: set[str]) -> str:
+    """A file name of a to z, 0 to 9 and hyphens that is not in ``taken``, and is then."""
+    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode().lower()
+    base = re.sub(r"[^a-z0-9]+", "-", plain).strip("-") or "gesture"
+    slug, number = base, 1
+    while slug in taken:
+        number += 1
+        slug = f"{base}-{number}"
+    taken.add(slug)
+    return slug
+
+
+def _toml(value: Any) -> str:
+    """A value in TOML on one line. JSON's strings, numbers and words are TOML's, too."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _parse(read: Read) -> list[NewGesture]:
+    try:
+        index = tomllib.loads(read(INDEX, INDEX_MAX_BYTES).decode())
+    except (ValueError, RecursionError) as error:
+        raise Invalid(f"{INDEX} is not TOML in UTF-8: {error}") from error
+    if index.get("format") != FORMAT or isinstance(index["format"], bool):
+        raise Invalid(
+            f"{INDEX} has format {index.get('format')!r}; this Farhand reads format {FORMAT}"
+        )
+    _no_others(index, ("format", "gesture"), INDEX)
+    tables = index.get("gesture", [])
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+        raise Invalid(f"{INDEX}: gestures are written as [[gesture]], with two brackets")
+    if len(tables) > MAX_GESTURES:
+        raise Invalid(f"{INDEX} has {len(tables)} gestures; at most {MAX_GESTURES} are allowed")
+    gestures: list[NewGesture] = []
+    names: dict[str, str] = {}
+    for number, table in enumerate(tables, start=1):
+        gesture = _gesture(read, table, f"{INDEX}, gesture {number}")
+        first = names.setdefault(name_key(gesture.name), gesture.name)
+        if len(names) < number:
+            raise Invalid(
+                f"{INDEX}, gesture {number}: the name {gesture.name!r} is taken by {first!r}"
+            )
+        gestures.append(gesture)
+    return gestures
+
+
+def _gesture(read: Read, table: dict[str, Any], where: str) -> NewGesture:
+    name, samples = table.get("name"), table.get("samples")
+    if not isinstance(name, str):
+        raise Invalid(f"{where}: name is missing, or is not a text")
+    try:
+        name = clean_name(name)
+    except Invalid as error:
+        raise Invalid(f"{where}: {error.message}") from error
+    where = f"{where} ({name})"
+    _no_others(table, ("name", "action", "samples"), where)
+    if not isinstance(samples, list) or not all(isinstance(path, str) for path in samples):
+        raise Invalid(f"{where}: samples is missing, or is not a list of paths")
+    action = _action(table.get("action"), where)
+    templates = []
+    for path in samples:
+        try:
+            templates.append(read_template(read(_safe(path), PNG_MAX_BYTES)))
+        except Invalid as error:
+            raise Invalid(f"{where}: sample {path!r} {error.message}") from error
+    return NewGesture(name, action, _checked(templates, where))
+
+
+def _checked(templates: Sequence[bytes], where: str) -> tuple[bytes, ...]:
+    try:
+        return check_templates(templates)
+    except Invalid as error:
+        raise Invalid(f"{where}: {error.message}") from error
+
+
+def _action(value: Any, where: str) -> Action:
+    try:
+        # By way of JSON, so that the file obeys exactly the rules of the REST interface.
+        return ACTION.validate_json(json.dumps(value, allow_nan=False), strict=True)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise Invalid(
+            f"{where}: bad action: {place}: {first['msg']}".replace(": :", ":")
+        ) from error
+    except (TypeError, ValueError) as error:
+        raise Invalid(f"{where}: bad action: {error}") from error
+
+
+def _no_others(table: dict[str, Any], allowed: tuple[str, ...], where: str) -> None:
+    others = sorted(set(table) - set(allowed))
+    if others:
+        raise Invalid(f"{where}: unknown key {others[0]!r}; allowed are {', '.join(allowed)}")
+
+
+def _safe(path: str) -> str:
+    """The path itself, once it is known to lead to a place below the set's folder."""
+    parts = PurePosixPath(path).parts
+    plain = path and path == "/".join(parts) and not path.startswith("/") and path.isprintable()
+    if not plain or ".." in parts or any(sign in path for sign in '\\:*?"<>|'):
+        raise Invalid("is not a plain path below the set's folder, such as 'forward/01.png'")
+    return path
+
+
+def _folder_reader(folder: Path) -> Read:
+    root = folder.resolve()
+
+    def read(path: str, limit: int) -> bytes:
+        file = (root / path).resolve()
+        if not file.is_relative_to(root):
+            raise Invalid("leads out of the set's folder")
+        if not file.is_file():
+            raise Invalid(_missing(path, folder))
+        with file.open("rb") as stream:
+            return _limited(stream.read(limit + 1), limit)
+
+    return read
+
+
+def _zip_reader(archive: zipfile.ZipFile) -> Read:
+    # The set may lie in one folder inside the zip, as file managers pack it.
+    tops = [name for name in archive.namelist() if PurePosixPath(name).name == INDEX]
+    prefix = min(tops, key=len)[: -len(INDEX)] if tops else ""
+    total = 0
+
+    def read(path: str, limit: int) -> bytes:
+        nonlocal total
+        try:
+            info = archive.getinfo(prefix + path)
+        except KeyError:
+            raise Invalid(_missing(path, "the zip file")) from None
+        # Bounded by what really comes out, whatever the entry says of itself.
+        with archive.open(info) as stream:
+            data = _limited(stream.read(limit + 1), limit)
+        total += len(data)
+        if total > ZIP_MAX_BYTES:
+            raise Invalid(f"makes the set larger than {ZIP_MAX_BYTES >> 20} MiB")
+        return data
+
+    return read
+
+
+def _missing(path: str, place: object) -> str:
+    return f"{INDEX} is missing in {place}" if path == INDEX else f"is missing in {place}"
+
+
+def _limited(data: bytes, limit: int) -> bytes:
+    if len(data) > limit:
+        raise Invalid(f"is larger than {limit} bytes")
+    return data

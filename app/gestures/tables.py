@@ -1,0 +1,54 @@
+"""The gesture database's tables. A change here needs a new script in ``migrations/versions``."""
+
+from sqlalchemy import BigInteger, ForeignKey, Integer, LargeBinary, String, Text
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
+
+
+class Base(DeclarativeBase):
+    """Base of all tables."""
+
+
+class GestureRow(Base):
+    """One gesture. Times are ms since 1970, UTC."""
+
+    __tablename__ = "gesture"
+
+    number: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=True)
+    """Rises with every gesture made: the order in which they are listed."""
+    id: Mapped[str] = mapped_column(String(32), unique=True)
+    name: Mapped[str] = mapped_column(String(60))
+    name_key: Mapped[str] = mapped_column(String(240), unique=True)
+    action: Mapped[str] = mapped_column(Text)
+    """JSON of :data:`app.link.actions.Action`."""
+    created_ms: Mapped[int] = mapped_column(BigInteger)
+    updated_ms: Mapped[int] = mapped_column(BigInteger)
+    checksum: Mapped[int] = mapped_column(BigInteger)
+    """CRC-32 of the other columns: a damaged action must never move a robot."""
+    samples: Mapped[list["SampleRow"]] = relationship(
+        order_by="SampleRow.number", cascade="all, delete-orphan", passive_deletes=True
+    )
+
+
+class SampleRow(Base):
+    """One template of a gesture."""
+
+    __tablename__ = "sample"
+
+    number: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=True)
+    id: Mapped[str] = mapped_column(String(32), unique=True)
+    gesture: Mapped[int] = mapped_column(
+        ForeignKey("gesture.number", ondelete="CASCADE"), index=True
+    )
+    template: Mapped[bytes] = mapped_column(LargeBinary(600))
+    created_ms: Mapped[int] = mapped_column(BigInteger)
+    checksum: Mapped[int] = mapped_column(BigInteger)
+    """CRC-32 of the other columns."""
+
+
+class GalleryRow(Base):
+    """The one row that counts changes, so that every process notices what another one did."""
+
+    __tablename__ = "gallery"
+
+    id: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=False)
+    version: Mapped[int] = mapped_column(BigInteger)
