@@ -50,11 +50,6 @@ class RobotSettings(_Section):
 class GatewaySettings(_Section):
     """The server between the browsers and the robots."""
 
-    tls_cert: Path | None = Field(default=None, description="certificate chain (PEM) for HTTPS")
-    tls_key: Path | None = Field(default=None, description="private key (PEM) of the certificate")
-    behind_proxy: bool = Field(
-        default=False, description="a proxy in front serves HTTPS; allows plain HTTP off loopback"
-    )
     allowed_hosts: tuple[str, ...] = Field(
         default=(),
         description="host names that requests may be addressed to; on loopback its own names are "
@@ -130,6 +125,11 @@ class Settings(BaseSettings):
     data_dir: Path = Field(default_factory=_data_dir, description="where everything is kept")
     token: SecretStr | None = Field(
         default=None, description="secret that opens the page and the API; made when not given"
+    )
+    tls_cert: Path | None = Field(default=None, description="certificate chain (PEM) for HTTPS")
+    tls_key: Path | None = Field(default=None, description="private key (PEM) of the certificate")
+    behind_proxy: bool = Field(
+        default=False, description="a proxy in front serves HTTPS; allows plain HTTP off loopback"
     )
     database_url: str | None = Field(
         default=None, description="SQLAlchemy URL; default: SQLite in the data folder"
