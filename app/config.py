@@ -7,9 +7,9 @@ Unknown keys are refused. Settings are passed in, never read at import.
 
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, SecretStr
+from pydantic import BaseModel, ConfigDict, Field, SecretStr, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 
@@ -21,17 +21,195 @@ Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class DecodeSettings(_Section):
-    """What a webcam frame may be."""
+    """What a webcam frame may be, and how large the pipeline makes it."""
 
     max_width: int = Field(default=1280, ge=64, le=4096, description="pixels")
     max_height: int = Field(default=720, ge=64, le=4096, description="pixels")
     max_bytes: int = Field(default=256 * 1024, ge=1024, le=8 << 20, description="bytes of one JPEG")
+    working_side: int = Field(
+        default=180,
+        ge=48,
+        le=2160,
+        description="pixels; a frame is decoded at 1, 1/2, 1/4 or 1/8 of its size, the smallest "
+        "whose shorter side has at least so many (640x480 becomes 320x240)",
+    )
+
+
+class SmoothSettings(_Section):
+    """Integer Gaussian."""
+
+    kernel: Literal[1, 3, 5, 7] = Field(default=5, description="pixels; 1 leaves the picture as is")
+
+
+class NormaliseSettings(_Section):
+    """Stretching the illumination to the full range."""
+
+    clip: float = Field(
+        default=0.0005,
+        ge=0.0,
+        le=0.2,
+        description="part of the pixels, at each end of the histogram, that may saturate",
+    )
+
+
+class BinariseSettings(_Section):
+    """From a grey plane to hand and background."""
+
+    channel: Literal["luminance", "cr"] = Field(
+        default="cr",
+        description="plane that is thresholded: luminance (the paper) or the red difference Cr",
+    )
+    polarity: Literal["auto", "light", "dark"] = Field(
+        default="auto",
+        description="is the hand the lighter or the darker side of the threshold; auto: the side "
+        "that holds less of the picture's border",
+    )
+    min_contrast: float = Field(
+        default=5.0,
+        ge=0.0,
+        le=255.0,
+        description="levels (of 255) between the mean of the hand and the mean of the background; "
+        "with less there is no hand",
+    )
+    min_area: Fraction = Field(default=0.005, description="smallest hand, part of the picture")
+    max_area: Fraction = Field(default=0.8, description="largest hand, part of the picture")
+
+
+class MotionSettings(_Section):
+    """The gate that lets only a hand at rest through."""
+
+    threshold: Fraction = Field(
+        default=0.01, description="still when fewer than this part of the pixels mismatch (paper)"
+    )
+    held_threshold: Fraction = Field(
+        default=0.04,
+        description="the same while a gesture is held, so that a hand that trembles keeps it",
+    )
+    interval_s: float = Field(
+        default=0.0,
+        ge=0.0,
+        le=2.0,
+        description="least time between two sampled frames; 0 samples every frame",
+    )
+
+
+class RoiSettings(_Section):
+    """The box round the hand."""
+
+    offset: float = Field(
+        default=0.01,
+        ge=0.0,
+        le=0.25,
+        description="a side moves inwards until white pixels exceed this part of the mask's width "
+        "or height (paper: m/100 and n/100)",
+    )
+
+
+class WristSettings(_Section):
+    """Where the arm is cut off."""
+
+    mode: Literal["circle", "histogram", "off"] = Field(
+        default="circle",
+        description="circle: a number of palm radii below the palm's largest inscribed circle; "
+        "histogram: the paper's minimum beyond the maximum; off: the arm stays",
+    )
+    radii: float = Field(
+        default=1.3,
+        ge=0.5,
+        le=4.0,
+        description="circle mode: palm radii from the palm's centre to the cut",
+    )
+
+
+class MatchSettings(_Section):
+    """Which enrolled gesture is nearest, and when none is near enough."""
+
+    features: Literal["distance", "binary"] = Field(
+        default="distance",
+        description="distance: signed distance transform squashed by tanh; binary: the pixels "
+        "themselves (the paper)",
+    )
+    components: int = Field(default=60, ge=1, le=400, description="principal components kept")
+    turns: tuple[float, ...] = Field(
+        default=(-0.3, -0.15, 0.0, 0.15, 0.3),
+        min_length=1,
+        max_length=15,
+        description="rad; every template and every query is also tried turned by these",
+    )
+    cuts: tuple[float, ...] = Field(
+        default=(1.0, 1.3, 1.7),
+        min_length=1,
+        max_length=5,
+        description="palm radii; every template and every query is also tried cut here",
+    )
+    max_distance: float = Field(
+        default=0.5,
+        ge=0.0,
+        le=2.0,
+        description="farthest accepted match, root mean square over the features; calibration on "
+        "the enrolled templates can only lower it",
+    )
+    calibrate: bool = Field(
+        default=True, description="lower max_distance by how far apart the enrolled gestures are"
+    )
+    min_margin: float = Field(
+        default=0.02,
+        ge=0.0,
+        le=2.0,
+        description="least lead over the second gesture, in the unit of the distance",
+    )
+    max_error: float = Field(
+        default=0.6,
+        ge=0.0,
+        le=2.0,
+        description="largest reconstruction error accepted, in the unit of the distance",
+    )
+
+
+class AgreementSettings(_Section):
+    """From matches to gestures that start, hold and end."""
+
+    votes: int = Field(default=2, ge=1, le=30, description="frames that must agree (N)")
+    window: int = Field(default=3, ge=1, le=30, description="of the last so many frames (M)")
+    release_s: float = Field(
+        default=0.15,
+        ge=0.0,
+        le=0.2,
+        description="a held gesture ends when no frame has shown it for so long",
+    )
+
+    @model_validator(mode="after")
+    def _enough_frames(self) -> Self:
+        if self.votes > self.window:
+            raise ValueError(f"votes ({self.votes}) must not exceed window ({self.window})")
+        return self
+
+
+class StillSettings(_Section):
+    """What a photograph for enrolment may be."""
+
+    max_bytes: int = Field(default=4 << 20, ge=1024, le=64 << 20, description="bytes of one file")
+    max_pixels: int = Field(
+        default=50_000_000, ge=4096, le=200_000_000, description="width times height"
+    )
+    working_side: int = Field(
+        default=320, ge=64, le=2160, description="pixels; longer side after scaling down"
+    )
 
 
 class PipelineSettings(_Section):
     """From a picture to a gesture."""
 
     decode: DecodeSettings = DecodeSettings()
+    smooth: SmoothSettings = SmoothSettings()
+    normalise: NormaliseSettings = NormaliseSettings()
+    binarise: BinariseSettings = BinariseSettings()
+    motion: MotionSettings = MotionSettings()
+    roi: RoiSettings = RoiSettings()
+    wrist: WristSettings = WristSettings()
+    match: MatchSettings = MatchSettings()
+    agreement: AgreementSettings = AgreementSettings()
+    still: StillSettings = StillSettings()
 
 
 class RobotSettings(_Section):
