@@ -1,89 +1,16 @@
 """A real server, a real robot node and a real browser with a fake webcam."""
 
 import os
-import re
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
-import httpx
-import psutil
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, Playwright, sync_playwright
 
+from tests.e2e.running import BASE_ARGUMENTS, Server, start_server, stop_server
+
 ARTIFACTS = Path(__file__).parents[2] / "test-artifacts"
-TOKEN = "end-to-end-token-0123456789abcdef"
-BASE_ARGUMENTS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--enable-unsafe-swiftshader",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--use-fake-device-for-media-stream",
-]
-
-
-@dataclass
-class Server:
-    """A running ``python -m app serve``."""
-
-    process: subprocess.Popen[str]
-    url: str
-    link: str
-    data_dir: Path
-    log: Path
-
-    def api(self) -> httpx.Client:
-        return httpx.Client(
-            base_url=self.url, headers={"Authorization": f"Bearer {TOKEN}"}, timeout=20
-        )
-
-    def node(self) -> psutil.Process:
-        """The robot node, a child of the gateway."""
-        for child in psutil.Process(self.process.pid).children():
-            if "camera" not in " ".join(child.cmdline()):
-                return child
-        raise AssertionError("the gateway has no robot node")
-
-
-def start_server(folder: Path, *options: str) -> Server:
-    """Start a server on a free port and wait for its link."""
-    log = folder / "server.log"
-    with log.open("a") as stderr:
-        process = subprocess.Popen(
-            [
-                sys.executable, "-m", "app", "serve", "--port", "0",
-                "--data-dir", str(folder / "data"), "--token", TOKEN, *options,
-            ],
-            stdout=subprocess.PIPE,
-            stderr=stderr,
-            text=True,
-            cwd=Path(__file__).parents[2],
-        )  # fmt: skip
-    assert process.stdout is not None
-    for line in process.stdout:
-        found = re.search(r"(https?://[^/\s]+)/\?token=\S+", line)
-        if found:
-            return Server(process, found[1], found[0], folder / "data", log)
-    raise AssertionError(f"the server printed no link:\n{log.read_text()}")
-
-
-def stop_server(server: Server) -> None:
-    server.process.terminate()
-    try:
-        server.process.wait(20)
-    except subprocess.TimeoutExpired:
-        server.process.kill()
-        raise
-    finally:
-        assert server.process.stdout is not None
-        server.process.stdout.close()
 
 
 @pytest.fixture

@@ -1,0 +1,123 @@
+"""A scripted operator: sends pictures over the operator WebSocket as the page does."""
+
+import asyncio
+import json
+import time
+from collections.abc import Awaitable, Callable, Sequence
+from typing import Any, Self
+
+from websockets.asyncio.client import ClientConnection, connect
+
+from app.link.header import FrameHeader
+
+MAX_IN_FLIGHT = 2
+"""Frames under way at once, as docs/protocol.md asks of a client."""
+
+
+class Operator:
+    """One signed-in session. Keeps what the server said; every message has a ``received`` time."""
+
+    def __init__(self, url: str, token: str) -> None:
+        self._url = url.replace("http", "ws", 1) + "/ws/operator"
+        self._token = token
+        self._socket: ClientConnection | None = None
+        self._reader: asyncio.Task[None] | None = None
+        self._changed = asyncio.Condition()
+        self._sequence = 0
+        self._in_flight: dict[int, float] = {}
+        self.tick = 0
+        self.frames: list[dict[str, Any]] = []
+        self.gestures: list[dict[str, Any]] = []
+        self.robot: dict[str, Any] = {}
+        self.errors: list[dict[str, Any]] = []
+        self.skipped = 0
+
+    async def __aenter__(self) -> Self:
+        self._socket = await connect(
+            self._url,
+            additional_headers={"Authorization": f"Bearer {self._token}"},
+            max_size=1 << 20,
+            compression=None,
+        )
+        self._reader = asyncio.create_task(self._read())
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        assert self._socket is not None and self._reader is not None
+        await self._socket.close()
+        await self._reader
+
+    async def _read(self) -> None:
+        assert self._socket is not None
+        async for raw in self._socket:
+            message = json.loads(raw)
+            message["received"] = time.monotonic()
+            self.tick = max(self.tick, message.get("tick") or 0)
+            match message["type"]:
+                case "frame":
+                    message["sent"] = self._in_flight.pop(message["seq"], None)
+                    self.frames.append(message)
+                case "gesture":
+                    self.gestures.append(message)
+                case "robot":
+                    self.robot = message
+                case "error":
+                    self._in_flight.pop(message.get("seq"), None)
+                    self.errors.append(message)
+            async with self._changed:
+                self._changed.notify_all()
+
+    async def wait_for(self, condition: Callable[[], object], seconds: float = 20.0) -> None:
+        """Wait until ``condition`` is true.
+
+        Raises:
+            TimeoutError: it did not become true.
+        """
+        async with asyncio.timeout(seconds), self._changed:
+            await self._changed.wait_for(lambda: bool(condition()))
+
+    async def say(self, kind: str, **fields: object) -> None:
+        """Send a text message."""
+        assert self._socket is not None
+        await self._socket.send(json.dumps({"type": kind, **fields}))
+
+    async def take_and_arm(self) -> None:
+        """Take control and arm, and wait until the robot says so."""
+        await self.wait_for(lambda: self.robot.get("mode") == "disarmed", 60)
+        await self.say("take_control")
+        await self.wait_for(lambda: self.robot.get("controller"))
+        await self.say("arm")
+        await self.wait_for(lambda: self.robot.get("armed"))
+
+    async def show(self, jpeg: bytes) -> int:
+        """Send one picture, or skip it when two are under way. Returns its number, or -1."""
+        assert self._socket is not None
+        now = time.monotonic()
+        # A frame that was replaced by a newer one on the server is never answered.
+        for number, sent in list(self._in_flight.items()):
+            if now - sent > 0.5:
+                del self._in_flight[number]
+        if len(self._in_flight) >= MAX_IN_FLIGHT:
+            self.skipped += 1
+            return -1
+        self._sequence += 1
+        self._in_flight[self._sequence] = now
+        header = FrameHeader(self._sequence, now * 1e3, self.tick)
+        await self._socket.send(header.pack() + jpeg)
+        return self._sequence
+
+    async def play(
+        self,
+        pictures: Sequence[bytes],
+        rate: float = 30.0,
+        at_each: Callable[[int, int], Awaitable[None]] | None = None,
+    ) -> None:
+        """Show the pictures at ``rate`` a second; ``at_each(index, seq)`` is awaited after each."""
+        start = time.monotonic()
+        for index, picture in enumerate(pictures):
+            delay = start + index / rate - time.monotonic()
+            if delay > 0:
+                await asyncio.sleep(delay)
+            number = await self.show(picture)
+            if at_each is not None:
+                await at_each(index, number)
