@@ -86,6 +86,7 @@ class ObjectModel(_Part):
     colour: tuple[float, float, float, float]
     mass: float = Field(default=0.0, ge=0, description="kg; 0: it never moves")
     friction: float = Field(default=0.6, ge=0)
+    grid: bool = Field(default=False, description="pictures show a 10 cm grid on its top")
 
 
 class Model(_Part):
