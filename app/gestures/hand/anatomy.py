@@ -37,7 +37,9 @@ def _mm(*lengths: float) -> tuple[float, float, float]:
 INDEX = FingerAnatomy((0.152, 0.470), _mm(39.8, 22.4, 15.8 + 3.8), (0.062, 0.0545, 0.0485, 0.0410))
 MIDDLE = FingerAnatomy((0.045, 0.490), _mm(44.6, 26.3, 17.4 + 4.0), (0.064, 0.0560, 0.0495, 0.0425))
 RING = FingerAnatomy((-0.060, 0.468), _mm(41.4, 25.7, 17.3 + 4.0), (0.060, 0.0525, 0.0465, 0.0395))
-LITTLE = FingerAnatomy((-0.152, 0.415), _mm(32.7, 18.1, 16.0 + 3.7), (0.053, 0.0460, 0.0415, 0.0345))
+LITTLE = FingerAnatomy(
+    (-0.152, 0.415), _mm(32.7, 18.1, 16.0 + 3.7), (0.053, 0.0460, 0.0415, 0.0345)
+)
 FINGERS = (INDEX, MIDDLE, RING, LITTLE)
 
 THUMB_BASE = (0.095, 0.090)

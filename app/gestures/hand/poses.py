@@ -37,11 +37,11 @@ RELAXED = HandPose(
 
 POSES: dict[str, HandPose] = {
     "forward": HandPose(_up(0.17), _up(-0.13), _FOLDED[2], _FOLDED[3], _ACROSS),
-    "back": HandPose(_up(0.10), _up(0.02), _up(-0.05), _up(-0.12), _TUCKED),
+    "back": HandPose(_up(0.22), _up(0.06), _up(-0.12), _up(-0.34), _TUCKED),
     "left": HandPose(*_FOLDED, _OUT),
     "right": HandPose(_FOLDED[0], _FOLDED[1], _FOLDED[2], _up(-0.30), _ACROSS),
     "up": HandPose(_up(0.04), _FOLDED[1], _FOLDED[2], _FOLDED[3], _ACROSS),
-    "down": HandPose(_up(0.14), _FOLDED[1], _FOLDED[2], _up(-0.22), _ACROSS),
+    "down": HandPose(_up(0.20), _FOLDED[1], _FOLDED[2], _up(-0.34), _ACROSS),
     "open": HandPose(_up(0.06), _FOLDED[1], _FOLDED[2], _FOLDED[3], _OUT),
     "close": HandPose(*_FOLDED, _ACROSS),
     "home": HandPose(_FOLDED[0], _FOLDED[1], _FOLDED[2], _up(-0.38), _OUT),

@@ -36,6 +36,30 @@ class Frame(NamedTuple):
     """Width of a pixel in hand's lengths."""
 
 
+def crop(cones: tuple[Cone, ...], frame: Frame, step: int) -> tuple[Frame, tuple[int, int]]:
+    """The part of a frame that the cones can touch.
+
+    Args:
+        cones: The hand.
+        frame: The whole picture.
+        step: The part's corners lie on multiples of this many pixels.
+
+    Returns:
+        The part, and the row and column at which it begins. At least ``step`` pixels each way.
+    """
+    windows = [window for cone in cones if (window := _window(cone, frame)) is not None]
+    rows = [edge for window in windows for edge in (window[0].start, window[0].stop)] or [0, step]
+    columns = [edge for window in windows for edge in (window[1].start, window[1].stop)] or [
+        0,
+        step,
+    ]
+    top, left = (min(edges) // step * step for edges in (rows, columns))
+    bottom, right = (-(-max(edges) // step) * step for edges in (rows, columns))
+    matrix = frame.matrix.copy()
+    matrix[:, 2] += matrix[:, :2] @ [left, top]
+    return Frame(matrix, (bottom - top, right - left), frame.pixel), (top, left)
+
+
 class Relief(NamedTuple):
     """What of the hand is seen in each pixel; all float32 or int8 of the frame's shape."""
 
@@ -122,12 +146,10 @@ def _window(cone: Cone, frame: Frame) -> tuple[slice, slice] | None:
     ends = np.array([[*cone.start[:2], 1.0], [*cone.end[:2], 1.0]]) @ inverse.T
     margin = reach / frame.pixel
     low = np.maximum(np.floor(ends.min(axis=0) - margin), 0).astype(int)
-    high = np.ceil(ends.max(axis=0) + margin).astype(int) + 1
-    columns = slice(low[0], min(high[0], frame.shape[1]))
-    rows = slice(low[1], min(high[1], frame.shape[0]))
-    if columns.start >= columns.stop or rows.start >= rows.stop:
+    high = np.minimum(np.ceil(ends.max(axis=0) + margin) + 1, frame.shape[::-1]).astype(int)
+    if np.any(low >= high):
         return None
-    return rows, columns
+    return slice(low[1], high[1]), slice(low[0], high[0])
 
 
 def _soft_min(a: Plane, b: Plane, width: float) -> Plane:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.gestures.hand.pose import HandPose
-from app.gestures.hand.raster import Frame, rasterise
+from app.gestures.hand.raster import Frame, crop, rasterise
 from app.gestures.hand.skeleton import pose_skeleton
 from app.gestures.hand.skin import TONES, paint
 
@@ -72,18 +72,23 @@ def render_sprite(
         look: Skin and light are used.
         fine: Drawn this many times finer.
     """
-    frame = _frame(size, view, fine)
     skeleton = pose_skeleton(pose)
+    # Only the part of the picture that holds the hand is worked on.
+    frame, (top, left) = crop(skeleton.cones, _frame(size, view, fine), fine)
     relief = rasterise(skeleton.cones, frame)
     colour = paint(skeleton, relief, frame, look.skin, look.light)
     cover = np.clip(0.5 - relief.distance / np.float32(frame.pixel), 0.0, 1.0)
     colour *= cover[..., None]
-    if fine == 1:
-        return HandSprite(colour, cover)
-    return HandSprite(
-        cv2.resize(colour, size, interpolation=cv2.INTER_AREA),
-        cv2.resize(cover, size, interpolation=cv2.INTER_AREA),
+    top, left, height, width = (n // fine for n in (top, left, *frame.shape))
+    if fine > 1:
+        colour = _smaller(colour, (width, height))
+        cover = _smaller(cover, (width, height))
+    whole = HandSprite(
+        np.zeros((size[1], size[0], 3), np.float32), np.zeros((size[1], size[0]), np.float32)
     )
+    window = slice(top, top + height), slice(left, left + width)
+    whole.colour[window], whole.cover[window] = colour, cover
+    return whole
 
 
 def render_hand(
@@ -108,7 +113,11 @@ def render_hand(
     view, look = view or HandView(), look or HandLook()
     sprite = render_sprite(pose, size, view, look)
     picture = compose(sprite, backdrop(size, look))
-    return finish(picture, look, np.random.default_rng(seed))
+    picture = through_lens(picture, look)
+    if look.noise:
+        noise = np.random.default_rng(seed).normal(0.0, look.noise, picture.shape)
+        picture = picture + noise.astype(np.float32)
+    return to_bytes(picture)
 
 
 def hand_mask(
@@ -137,18 +146,26 @@ def compose(sprite: HandSprite, background: NDArray[np.float32]) -> NDArray[np.f
     return sprite.colour + background * (1.0 - sprite.cover)[..., None]
 
 
-def finish(
-    picture: NDArray[np.float32], look: HandLook, generator: np.random.Generator
-) -> Image:
-    """What the camera makes of it: uneven light, blur, noise, eight bits."""
-    if look.gradient:
-        fall = np.linspace(1.0, 1.0 - look.gradient, picture.shape[1], dtype=np.float32)
-        picture = picture * fall[None, :, None]
+def through_lens(plane: NDArray[np.float32], look: HandLook) -> NDArray[np.float32]:
+    """Uneven light and blur, of a picture or of a sprite's planes (a cover only blurs).
+
+    Both are linear, so that a sprite and its background may pass the lens one by one.
+    """
+    if look.gradient and plane.ndim == 3:
+        fall = np.linspace(1.0, 1.0 - look.gradient, plane.shape[1], dtype=np.float32)
+        plane = plane * fall[None, :, None]
     if look.blur:
-        picture = cv2.GaussianBlur(picture, (0, 0), look.blur)
-    if look.noise:
-        picture = picture + generator.normal(0.0, look.noise, picture.shape).astype(np.float32)
-    return np.clip(picture + 0.5, 0, 255).astype(np.uint8)
+        plane = np.asarray(cv2.GaussianBlur(plane, (0, 0), look.blur), np.float32)
+    return plane
+
+
+def to_bytes(picture: NDArray[np.float32]) -> Image:
+    """Eight bits a channel, rounded."""
+    return np.asarray(np.clip(picture + 0.5, 0, 255), np.uint8)
+
+
+def _smaller(plane: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
+    return np.asarray(cv2.resize(plane, size, interpolation=cv2.INTER_AREA), np.float32)
 
 
 def _frame(size: tuple[int, int], view: HandView, fine: int) -> Frame:

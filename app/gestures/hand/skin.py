@@ -80,8 +80,8 @@ def _marks(skeleton: Skeleton, relief: Relief, frame: Frame) -> tuple[Plane, Pla
     nails = np.zeros(frame.shape, np.float32)
     thick = max(round(0.006 * unit), 1)
     layer = np.zeros(frame.shape, np.uint8)
-    for curve in _PALM_LINES:
-        cv2.polylines(layer, [pixels(_bezier(curve))], False, 170, thick, cv2.LINE_AA, 4)
+    for palm_line in _PALM_LINES:
+        cv2.polylines(layer, [pixels(_bezier(palm_line))], False, 170, thick, cv2.LINE_AA, 4)
     lines = np.maximum(lines, np.where(relief.part == PALM, layer, 0) / np.float32(255))
     for chain in skeleton.chains:
         layer = np.zeros(frame.shape, np.uint8)
@@ -95,16 +95,18 @@ def _marks(skeleton: Skeleton, relief: Relief, frame: Frame) -> tuple[Plane, Pla
             cv2.fillPoly(layer, [pixels(nail)], 255, cv2.LINE_AA, 4)
             nails = np.maximum(nails, np.where(own, layer, 0) / np.float32(255))
     blur = max(0.0035 * unit, 0.5)
-    return (
-        cv2.GaussianBlur(lines.astype(np.float32), (0, 0), blur),
-        cv2.GaussianBlur(nails.astype(np.float32), (0, 0), blur),
-    )
+    return _soft(lines, blur), _soft(nails, blur)
+
+
+def _soft(plane: NDArray[np.float32], sigma: float) -> Plane:
+    return np.asarray(cv2.GaussianBlur(plane, (0, 0), sigma), np.float32)
 
 
 def _bezier(curve: tuple[tuple[float, float], ...]) -> NDArray[np.float64]:
     t = np.linspace(0.0, 1.0, 24)[:, None]
     a, b, c, d = (np.array(point) for point in curve)
-    return (1 - t) ** 3 * a + 3 * (1 - t) ** 2 * t * b + 3 * (1 - t) * t**2 * c + t**3 * d
+    points = (1 - t) ** 3 * a + 3 * (1 - t) ** 2 * t * b + 3 * (1 - t) * t**2 * c + t**3 * d
+    return np.asarray(points, np.float64)
 
 
 def _creases(chain: Chain) -> list[NDArray[np.float64]]:

@@ -1,0 +1,112 @@
+"""The starter set: ten gestures with their actions, drawn by the project's own hand."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from app.errors import Invalid
+from app.gestures.hand.pose import HandPose, jitter
+from app.gestures.hand.poses import POSES
+from app.gestures.hand.render import HandLook, HandView, render_hand
+from app.gestures.hand.skin import TONES
+from app.gestures.records import TEMPLATE_HEIGHT, TEMPLATE_WIDTH, NewGesture
+from app.gestures.setfile import write_set
+from app.link.actions import Action, Gripper, Home, JogCartesian, Stop
+
+Extract = Callable[[bytes], NDArray[np.uint8]]
+"""Gives the template, shape (80, 60), 0 and 1, of an image file's bytes: the pipeline's part."""
+
+SPEED = 0.10
+"""m/s of the six moves."""
+ACTIONS: dict[str, Action] = {
+    "forward": JogCartesian(frame="base", linear=(SPEED, 0.0, 0.0)),
+    "back": JogCartesian(frame="base", linear=(-SPEED, 0.0, 0.0)),
+    "left": JogCartesian(frame="base", linear=(0.0, SPEED, 0.0)),
+    "right": JogCartesian(frame="base", linear=(0.0, -SPEED, 0.0)),
+    "up": JogCartesian(frame="base", linear=(0.0, 0.0, SPEED)),
+    "down": JogCartesian(frame="base", linear=(0.0, 0.0, -SPEED)),
+    "open": Gripper(width=0.08),
+    "close": Gripper(width=0.0),
+    "home": Home(),
+    "stop": Stop(),
+}
+"""What each starter gesture does: six moves in an exact direction, gripper, home, stop."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Variant:
+    """How one sample differs from the plain pose."""
+
+    turn: float = 0.0
+    length: float = 270.0
+    jitter: float = 0.0
+    skin: str = "medium"
+
+
+VARIANTS = (
+    _Variant(),
+    _Variant(turn=-0.14),
+    _Variant(turn=0.14),
+    _Variant(turn=-0.28, jitter=0.03),
+    _Variant(turn=0.28, jitter=0.03, skin="light"),
+    _Variant(length=225.0, jitter=0.05),
+    _Variant(length=315.0, jitter=0.05, skin="tan"),
+    _Variant(turn=-0.07, jitter=0.07, skin="brown"),
+    _Variant(turn=0.07, jitter=0.07),
+)
+"""One sample each: turns, sizes, and what differs between people."""
+
+
+def starter_pictures(pose: HandPose, seed: int) -> list[NDArray[np.uint8]]:
+    """The pictures of a gesture that its samples are made of, 640x480 BGR.
+
+    Args:
+        pose: The gesture's.
+        seed: The same seed gives the same pictures.
+    """
+    generator = np.random.default_rng(seed)
+    pictures = []
+    for variant in VARIANTS:
+        view = HandView(variant.length, turn=variant.turn)
+        look = HandLook(skin=TONES[variant.skin])
+        varied = jitter(pose, variant.jitter, generator)
+        pictures.append(render_hand(varied, view=view, look=look))
+    return pictures
+
+
+def starter_set(extract: Extract) -> list[NewGesture]:
+    """Draw the ten gestures and take their templates.
+
+    Raises:
+        Invalid: ``extract`` gives something that is not a template.
+    """
+    gestures = []
+    for seed, (name, action) in enumerate(ACTIONS.items()):
+        templates = []
+        for picture in starter_pictures(POSES[name], seed):
+            done, data = cv2.imencode(".png", picture)
+            assert done
+            template = np.asarray(extract(data.tobytes()))
+            if template.shape != (TEMPLATE_HEIGHT, TEMPLATE_WIDTH) or template.max() > 1:
+                raise Invalid(
+                    f"a template has the shape (80, 60) and holds 0 and 1; got {template.shape}, "
+                    f"up to {template.max()}"
+                )
+            templates.append(np.packbits(template.astype(np.uint8)).tobytes())
+        gestures.append(NewGesture(name, action, tuple(templates)))
+    return gestures
+
+
+def draw_starter_set(target: Path, extract: Extract) -> list[NewGesture]:
+    """Write the starter set to a new folder, or to a zip file, in the exchange format.
+
+    Raises:
+        Invalid: the target exists and is not an empty folder.
+    """
+    gestures = starter_set(extract)
+    write_set(gestures, target)
+    return gestures
