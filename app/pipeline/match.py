@@ -1,0 +1,198 @@
+"""PCA match: nearest enrolled template among the principal components, or unknown."""
+
+from dataclasses import dataclass
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.config import MatchSettings
+from app.errors import Invalid
+from app.pipeline.features import Features
+from app.pipeline.template import HEIGHT, WIDTH
+from app.pipeline.types import F32, U8, Match
+from app.pipeline.views import Views
+
+MAX_FITTED = 2000
+"""Views that the principal components are computed from; more are thinned evenly."""
+
+
+@dataclass(frozen=True)
+class Gallery:
+    """The enrolled templates.
+
+    Attributes:
+        labels: One name a template; names repeat.
+        templates: (n, 80, 60) uint8 of 0 and 1.
+
+    Raises:
+        Invalid: the numbers of labels and templates differ, or the shape is another.
+    """
+
+    labels: tuple[str, ...]
+    templates: U8
+
+    def __post_init__(self) -> None:
+        expected = (len(self.labels), HEIGHT, WIDTH)
+        if self.templates.shape != expected:
+            raise Invalid(f"templates of shape {self.templates.shape} where {expected} is needed")
+
+    @classmethod
+    def empty(cls) -> Self:
+        """A gallery without any template."""
+        return cls((), np.zeros((0, HEIGHT, WIDTH), np.uint8))
+
+
+class Matched(NamedTuple):
+    """The nearest gesture (None when the gallery is empty) and the distance to each."""
+
+    match: Match | None
+    distances: dict[str, float]
+
+
+class PcaMatcher:
+    """Nearest neighbour in the space of the principal components (paper: eigen-gestures).
+
+    With the features ``x`` of a view, the mean ``mu`` of the enrolled ones and the ``k`` leading
+    eigenvectors ``P`` of their covariance (Turk and Pentland, "Eigenfaces for Recognition", 1991)::
+
+        z = P^T (x - mu)                       coordinates
+        e = sqrt(|x - mu|^2 - |z|^2)           reconstruction error
+        d(q, g) = sqrt(|z_q - z_g|^2 + (e_q - e_g)^2) / sqrt(dimensions)
+
+    ``d`` is the distance within the components and the difference of the distances from them: never
+    more than the true distance, and equal to it when the gallery is small enough to be spanned
+    whole. So one template alone works as well as hundreds. The nearest pair of views counts.
+
+    Unknown (ours): ``d`` above the largest distance, ``e / sqrt(dimensions)`` above the largest
+    error, or the second gesture nearly as near. Immutable after :meth:`fit`, so that any number of
+    threads may share it.
+    """
+
+    def __init__(self, settings: MatchSettings) -> None:
+        self.settings = settings
+        self.labels: tuple[str, ...] = ()
+        self.max_distance = settings.max_distance
+        self._features = Features(settings)
+
+    @classmethod
+    def fit(cls, gallery: Gallery, settings: MatchSettings) -> Self:
+        """Learn a gallery. An empty one is allowed: nothing ever matches then."""
+        matcher = cls(settings)
+        if gallery.labels:
+            matcher._fit(gallery)
+        return matcher
+
+    def _fit(self, gallery: Gallery) -> None:
+        order = sorted(range(len(gallery.labels)), key=lambda i: gallery.labels[i])
+        labels = [gallery.labels[i] for i in order]
+        self.labels = tuple(dict.fromkeys(labels))
+        views = Views(self.settings)
+        per_template = [self._features(views.of_template(gallery.templates[i])) for i in order]
+        rows = np.concatenate(per_template)
+        owner = np.repeat(np.arange(len(order)), [len(part) for part in per_template])
+        self._dimensions = rows.shape[1]
+        self._mean: F32 = rows.mean(axis=0)
+        rows -= self._mean
+        self._basis = _principal(rows, self.settings.components)
+        self._rows = self._coordinates(rows)
+        self._squares: F32 = np.einsum("ij,ij->i", self._rows, self._rows)
+        of_row = np.array([self.labels.index(labels[i]) for i in owner])
+        self._starts: NDArray[np.intp] = np.flatnonzero(np.r_[True, of_row[1:] != of_row[:-1]])
+        if self.settings.calibrate and len(self.labels) > 1:
+            self.max_distance = min(self.max_distance, self._calibrated(owner))
+
+    def _calibrated(self, owner: NDArray[np.intp]) -> float:
+        """How far apart the enrolled gestures are: the median distance to the nearest other one."""
+        first = np.flatnonzero(np.r_[True, owner[1:] != owner[:-1]])
+        # One view a template, the untouched one, is compared with all views of all others.
+        to_labels = self._to_labels(self._rows[first + len(self.settings.turns) // 2])
+        own = np.searchsorted(self._starts, first, side="right") - 1
+        to_labels[np.arange(len(first)), own] = np.inf
+        return float(np.median(to_labels.min(axis=1)))
+
+    def _coordinates(self, centred: F32) -> F32:
+        """(v, d) centred features to (v, k + 1): components, then the reconstruction error."""
+        inside = centred @ self._basis
+        total: F32 = np.einsum("ij,ij->i", centred, centred)
+        within: F32 = np.einsum("ij,ij->i", inside, inside)
+        error = np.sqrt(np.maximum(total - within, 0))
+        return np.concatenate([inside, error[:, None]], axis=1)
+
+    def _to_labels(self, points: F32) -> F32:
+        """(v, k + 1) coordinates to (v, labels) distances."""
+        squares = np.einsum("ij,ij->i", points, points)
+        table = points @ self._rows.T
+        table *= -2
+        table += self._squares
+        nearest: F32 = np.minimum.reduceat(table, self._starts, axis=1)
+        nearest += squares[:, None]
+        distances: F32 = np.sqrt(np.maximum(nearest, 0) / self._dimensions)
+        return distances
+
+    def __call__(self, views: U8) -> Matched:
+        """Match one hand.
+
+        Args:
+            views: (v, h, w) as :class:`~app.pipeline.views.Views` makes them.
+        """
+        if not self.labels:
+            return Matched(None, {})
+        points = self._coordinates(self._features(views) - self._mean)
+        table = self._to_labels(points)
+        best_view = int(table.min(axis=1).argmin())
+        per_label = table.min(axis=0)
+        distances = dict(zip(self.labels, per_label.tolist(), strict=True))
+        best = int(per_label.argmin())
+        distance = distances[self.labels[best]]
+        margin: float | None = None
+        second = ""
+        if len(self.labels) > 1:
+            others = per_label.copy()
+            others[best] = np.inf
+            runner_up = int(others.argmin())
+            second = self.labels[runner_up]
+            margin = distances[second] - distance
+        error = float(points[best_view, -1]) / float(np.sqrt(self._dimensions))
+        reason = self._why_unknown(self.labels[best], distance, second, margin, error)
+        match = Match(self.labels[best], distance, margin, error, reason is None, reason)
+        return Matched(match, distances)
+
+    def match_template(self, template: U8) -> Matched:
+        """Match an (80, 60) template of which nothing else is known."""
+        return self(Views(self.settings).of_template(template))
+
+    def _why_unknown(
+        self, name: str, distance: float, second: str, margin: float | None, error: float
+    ) -> str | None:
+        if distance > self.max_distance:
+            return (
+                f"unknown hand: closest is {name}, but too far "
+                f"({distance:.2f}, at most {self.max_distance:.2f})"
+            )
+        if error > self.settings.max_error:
+            return (
+                f"unknown hand: closest is {name}, but the shape is unlike any enrolled one "
+                f"({error:.2f}, at most {self.settings.max_error:.2f})"
+            )
+        if margin is not None and margin < self.settings.min_margin:
+            return f"undecided: {name} and {second} are almost equally close"
+        return None
+
+
+def _principal(centred: F32, components: int) -> F32:
+    """(n, d) centred rows to the (d, k) leading eigenvectors of their covariance.
+
+    The smaller of the two Gram matrices is decomposed; directions without variance are left out.
+    """
+    sample = centred[:: -(-len(centred) // MAX_FITTED)].astype(np.float64)
+    count, dimensions = sample.shape
+    gram = sample @ sample.T if count < dimensions else sample.T @ sample
+    values, vectors = np.linalg.eigh(gram)
+    values, vectors = values[::-1][:components], vectors[:, ::-1][:, :components]
+    keep = values > max(1e-6 * float(values[0]), 1e-9)
+    values, vectors = values[keep], vectors[:, keep]
+    if count < dimensions:
+        vectors = (sample.T @ vectors) / np.sqrt(values)
+    basis: F32 = np.ascontiguousarray(vectors, np.float32)
+    return basis

@@ -1,0 +1,84 @@
+"""Palm: the largest circle inside the mask, and the piece of the mask it lies in."""
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from app.pipeline.types import U8, Side
+
+SIDES: tuple[Side, ...] = ("bottom", "left", "top", "right")
+MIN_CONTACT = 0.25
+"""Palm radii. A piece that touches the picture's border on less has no arm in the picture."""
+
+
+class Palm(NamedTuple):
+    """The hand's piece and its palm.
+
+    Attributes:
+        piece: (h, w), 0 or 1: the connected piece round the palm, arm included. A buffer.
+        x: Of the palm's centre, pixels.
+        y: Of the palm's centre, pixels.
+        radius: Of the largest inscribed circle, pixels; 0 when the mask is empty.
+        area: Pixels of the piece.
+        arm: The side at which the piece touches the picture's border most, or None.
+    """
+
+    piece: U8
+    x: int
+    y: int
+    radius: float
+    area: int
+    arm: Side | None
+
+    @property
+    def found(self) -> bool:
+        """Whether there is anything white at all."""
+        return self.radius > 0
+
+
+def arm_side(piece: U8, least: float) -> Side | None:
+    """The side where most of the piece's border pixels lie, if they are more than ``least``."""
+    contact = (
+        cv2.countNonZero(piece[-1]),
+        cv2.countNonZero(piece[:, 0]),
+        cv2.countNonZero(piece[0]),
+        cv2.countNonZero(piece[:, -1]),
+    )
+    most = max(contact)
+    return SIDES[contact.index(most)] if most > 0 and most >= least else None
+
+
+class PalmFinder:
+    """The maximum of the Euclidean distance transform is the palm's largest inscribed circle.
+
+    ``radius = max_p min_{q not in mask} |p - q|`` (OpenCV's 5x5 chamfer approximation; Borgefors,
+    CVGIP 34, 1986). What lies outside the picture counts as background, so that the whole circle is
+    in the picture. Everything not connected to the palm is dropped.
+    """
+
+    def __init__(self) -> None:
+        self._piece: U8 = np.empty(0, np.uint8)
+        self._framed: U8 = np.empty(0, np.uint8)
+        self._distance: NDArray[np.float32] = np.empty(0, np.float32)
+
+    def __call__(self, mask: U8) -> Palm:
+        """Find the palm in a (h, w) mask of 0 and 1."""
+        if self._piece.shape != mask.shape:
+            self._piece = np.empty(mask.shape, np.uint8)
+            framed = (mask.shape[0] + 2, mask.shape[1] + 2)
+            self._framed = np.zeros(framed, np.uint8)
+            self._distance = np.empty(framed, np.float32)
+        piece = self._piece
+        np.copyto(self._framed[1:-1, 1:-1], mask)
+        cv2.distanceTransform(self._framed, cv2.DIST_L2, 5, dst=self._distance)
+        _, radius, _, (x, y) = cv2.minMaxLoc(self._distance)
+        if radius <= 0:
+            piece.fill(0)
+            return Palm(piece, 0, 0, 0.0, 0, None)
+        x, y = x - 1, y - 1
+        np.copyto(piece, mask)
+        area, *_ = cv2.floodFill(piece, None, (x, y), 2)
+        cv2.threshold(piece, 1, 1, cv2.THRESH_BINARY, dst=piece)
+        return Palm(piece, x, y, radius, int(area), arm_side(piece, MIN_CONTACT * radius))

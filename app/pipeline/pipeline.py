@@ -1,0 +1,146 @@
+"""The pipeline: the order of the stages, and a name for everything between them."""
+
+from app.config import PipelineSettings
+from app.pipeline.agreement import Agreement
+from app.pipeline.decode import Decode
+from app.pipeline.hand import FindHand, Stopwatch
+from app.pipeline.match import Matched, PcaMatcher
+from app.pipeline.motion import MotionGate
+from app.pipeline.palm import Palm
+from app.pipeline.roi import RegionOfInterest
+from app.pipeline.template import MakeTemplate
+from app.pipeline.types import U8, Box, FrameResult, GestureEvent, WristCut
+from app.pipeline.views import Views
+from app.pipeline.wrist import WristCrop
+
+STAGES = (
+    "decode",
+    "channel",
+    "smooth",
+    "normalise",
+    "binarise",
+    "palm",
+    "motion",
+    "wrist",
+    "roi",
+    "template",
+    "views",
+    "match",
+)
+"""Names in ``FrameResult.timing_ms``, beside ``total``."""
+
+
+class Pipeline:
+    """JPEG to gesture event. One per operator: it holds buffers, the gate and the agreement.
+
+    Attributes:
+        matcher: May be replaced at any time, when the gallery changed.
+    """
+
+    def __init__(self, settings: PipelineSettings, matcher: PcaMatcher) -> None:
+        self.settings = settings
+        self.matcher = matcher
+        self._decode = Decode(settings.decode)
+        self._find_hand = FindHand(settings)
+        self._gate = MotionGate(settings.motion)
+        self._crop_wrist = WristCrop(settings.wrist)
+        self._find_box = RegionOfInterest(settings.roi)
+        self._make_template = MakeTemplate()
+        self._make_views = Views(settings.match)
+        self._agree = Agreement(settings.agreement)
+
+    def reset(self) -> None:
+        """Forget the frames seen and the gesture held, without an event."""
+        self._gate.reset()
+        self._agree.reset()
+
+    def tick(self, now: float) -> GestureEvent | None:
+        """End a held gesture when frames stop coming; ``now`` in seconds, monotonic."""
+        return self._agree.tick(now)
+
+    def __call__(self, jpeg: bytes, *, seq: int, now: float) -> FrameResult:
+        """Process one frame.
+
+        Args:
+            jpeg: Baseline JPEG.
+            seq: The frame's number, carried through to the events.
+            now: Seconds, monotonic.
+
+        Raises:
+            FrameRefused: see :class:`~app.pipeline.decode.Decode`; nothing is changed by it.
+        """
+        watch = Stopwatch(dict.fromkeys((*STAGES, "total"), 0.0))
+        frame = self._decode(jpeg)
+        watch.lap("decode")
+        palm = self._find_hand(frame.pixels, watch)
+        motion = self._gate(palm.piece, now)
+        watch.lap("motion")
+
+        box: Box | None = None
+        cut: WristCut | None = None
+        template: U8 | None = None
+        matched = Matched(None, {})
+        reason = self._find_hand.why_none(palm)
+        if reason is None:
+            hand, cut = self._crop_wrist(palm)
+            watch.lap("wrist")
+            box = self._find_box(hand)
+            watch.lap("roi")
+            if box is None:
+                reason = "no hand in the picture: nothing is left above the wrist"
+        looked_at = motion.still or (self._agree.gesture is not None and motion.nearly_still)
+        if reason is None and motion.fraction is None:
+            reason = "waiting for three frames"
+        elif reason is None and not looked_at:
+            reason = f"hand still moving: {motion.fraction:.1%} of the pixels changed"
+        elif reason is None and box is not None:
+            template = self._make_template(hand, box)
+            watch.lap("template")
+            views = self._make_views(whole_or_cut(palm, hand, self.settings))
+            watch.lap("views")
+            matched = self.matcher(views)
+            watch.lap("match")
+            reason = matched.match.reason if matched.match else "no gesture is enrolled yet"
+
+        shown = matched.match.gesture if matched.match and matched.match.accepted else None
+        event = self._agree(shown, seq, now)
+        scale_x, scale_y = frame.width / palm.piece.shape[1], frame.height / palm.piece.shape[0]
+        return FrameResult(
+            seq=seq,
+            motion=motion.fraction,
+            still=motion.still,
+            roi=scale_box(box, scale_x, scale_y),
+            wrist=scale_cut(cut, scale_x, scale_y),
+            mask=palm.piece.copy(),
+            template=template,
+            match=matched.match,
+            distances=matched.distances,
+            reason=reason,
+            timing_ms=watch.timing_ms,
+            event=event,
+            gesture=self._agree.gesture,
+        )
+
+
+def whole_or_cut(palm: Palm, hand: U8, settings: PipelineSettings) -> Palm:
+    """What views are made of: the hand with its arm when views vary the cut, else without."""
+    if settings.wrist.mode == "circle" and settings.match.cuts:
+        return palm
+    return palm._replace(piece=hand)
+
+
+def scale_box(box: Box | None, scale_x: float, scale_y: float) -> Box | None:
+    """A box of the working picture in pixels of the source."""
+    if box is None:
+        return None
+    x, y, width, height = box
+    left, top = round(x * scale_x), round(y * scale_y)
+    return left, top, round((x + width) * scale_x) - left, round((y + height) * scale_y) - top
+
+
+def scale_cut(cut: WristCut | None, scale_x: float, scale_y: float) -> WristCut | None:
+    """A cut of the working picture in pixels of the source."""
+    if cut is None:
+        return None
+    scale = scale_y if cut.side in ("bottom", "top") else scale_x
+    return cut._replace(at=round(cut.at * scale))

@@ -1,0 +1,137 @@
+"""What the stages hand to one another and what a frame leads to.
+
+Masks and templates are uint8 arrays that hold 0 and 1. Boxes are ``(x, y, width, height)``.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+U8 = NDArray[np.uint8]
+F32 = NDArray[np.float32]
+Box = tuple[int, int, int, int]
+Side = Literal["bottom", "left", "top", "right"]
+Phase = Literal["start", "hold", "end"]
+
+
+class WristCut(NamedTuple):
+    """A straight cut along the picture's axes, in pixels.
+
+    ``side`` is where the arm enters; the cut runs along x (for ``bottom`` and ``top``) or y at
+    ``at``, and everything from there to that side is not hand.
+    """
+
+    side: Side
+    at: int
+
+
+@dataclass(frozen=True)
+class Match:
+    """The enrolled gesture nearest to a picture.
+
+    Attributes:
+        gesture: Its name.
+        distance: Root mean square over the features; 0 is the enrolled template itself.
+        margin: Distance of the second gesture minus this one; None when only one is enrolled.
+        error: Reconstruction error, in the unit of the distance.
+        accepted: False when the distance, the margin or the error says that it is unknown.
+        reason: Why it is not accepted, in plain words.
+    """
+
+    gesture: str
+    distance: float
+    margin: float | None
+    error: float
+    accepted: bool
+    reason: str | None = None
+
+
+@dataclass(frozen=True)
+class GestureEvent:
+    """A gesture begins, goes on or is over. ``seq`` is the frame that says so."""
+
+    gesture: str
+    phase: Phase
+    seq: int
+
+
+@dataclass(frozen=True)
+class FrameResult:
+    """All that one frame led to.
+
+    Attributes:
+        seq: The frame's number, as its sender gave it.
+        motion: Part of the pixels (0 to 1) that changed; None before three frames were sampled.
+        still: True when the motion gate lets the frame through.
+        roi: The hand without the arm, in pixels of the frame as sent.
+        wrist: Where the arm is cut off, in pixels of the frame as sent.
+        mask: (h, w), hand with arm = 1, at the working resolution; its own copy.
+        template: (80, 60), or None when the frame did not get that far.
+        match: The nearest gesture, also when it was not accepted; None without a template.
+        distances: Distance to every enrolled gesture.
+        reason: Why nothing comes of this frame, in plain words; None when a gesture was seen.
+        timing_ms: Time spent in each stage, and ``total``.
+        event: What changed with this frame.
+        gesture: The gesture that is held now.
+    """
+
+    seq: int
+    motion: float | None
+    still: bool
+    roi: Box | None
+    wrist: WristCut | None
+    mask: U8
+    template: U8 | None
+    match: Match | None
+    reason: str | None
+    timing_ms: Mapping[str, float]
+    event: GestureEvent | None
+    gesture: str | None
+    distances: Mapping[str, float] = field(default_factory=dict)
+
+    def as_message(self, tick: int = 0) -> dict[str, Any]:
+        """The ``frame`` message of docs/protocol.md. A match that was not accepted is null."""
+        match = None
+        if self.match is not None and self.match.accepted:
+            match = {
+                "gesture": self.match.gesture,
+                "distance": round(self.match.distance, 4),
+                "margin": None if self.match.margin is None else round(self.match.margin, 4),
+            }
+        return {
+            "type": "frame",
+            "seq": self.seq,
+            "tick": tick,
+            "motion": None if self.motion is None else round(self.motion, 5),
+            "still": self.still,
+            "roi": None if self.roi is None else list(self.roi),
+            "match": match,
+            "reason": self.reason,
+            "timing_ms": {stage: round(ms, 3) for stage, ms in self.timing_ms.items()},
+        }
+
+
+@dataclass(frozen=True)
+class Extraction:
+    """The hand found in one photograph.
+
+    Attributes:
+        mask: (h, w), hand with arm = 1, at the working resolution.
+        roi: The hand without the arm, in pixels of the photograph as it is shown (EXIF applied).
+        wrist: Where the arm was cut off, in the same pixels, or None.
+        template: (80, 60).
+        views: (v, 80, 60): the template turned and cut in several ways, for matching.
+        width: Of the photograph, pixels.
+        height: Of the photograph, pixels.
+    """
+
+    mask: U8
+    roi: Box
+    wrist: WristCut | None
+    template: U8
+    views: U8
+    width: int
+    height: int

@@ -1,0 +1,95 @@
+"""Views: one hand turned a little and cut at several wrists, so that both may differ a little.
+
+Every enrolled template and every query is varied in the same way, and the nearest pair of views
+counts. On the digit signs this raises the accuracy with 1, 5 and 20 enrolled photos a sign from
+0.54, 0.78 and 0.91 to about 0.72, 0.92 and 0.96 (benchmarks/recognition.py).
+"""
+
+import math
+
+import cv2
+import numpy as np
+
+from app.config import MatchSettings
+from app.pipeline.palm import Palm, PalmFinder
+from app.pipeline.template import HEIGHT, WIDTH, resize_mask
+from app.pipeline.types import U8
+from app.pipeline.wrist import cut_at, erase_arm
+
+SMALL = 80
+"""Pixels. The hand is scaled so that its longer side has so many before it is turned: twice what
+the features resolve."""
+_CANVAS = math.ceil(SMALL * math.sqrt(2)) + 2
+"""Pixels. Holds the small hand at any turn."""
+
+
+class Views:
+    """A hand as (v, h, w) masks, one for each pair of a cut and a turn.
+
+    Each view: cut ``c`` palm radii from the palm's centre towards the arm, turned about the box's
+    centre by ``a``, boxed again, and stretched to ``w`` x ``h``. That is 30x40 for the ``distance``
+    features, whose smooth transform carries no more detail, and 60x80 for ``binary``.
+    """
+
+    def __init__(self, settings: MatchSettings) -> None:
+        self._cuts = sorted(set(settings.cuts))
+        self._turns = settings.turns
+        half = settings.features == "distance"
+        self.width, self.height = (WIDTH // 2, HEIGHT // 2) if half else (WIDTH, HEIGHT)
+        self._canvas: U8 = np.zeros((_CANVAS, _CANVAS), np.uint8)
+        self._find_palm = PalmFinder()
+
+    def of_template(self, template: U8) -> U8:
+        """Views of an (80, 60) template, whose flattest side is taken for the wrist."""
+        return self(self._find_palm(np.ascontiguousarray(template, np.uint8)))
+
+    def __call__(self, palm: Palm) -> U8:
+        """Views of the hand in ``palm.piece``; at least one."""
+        if not palm.found:
+            return np.zeros((1, self.height, self.width), np.uint8)
+        cuts = [cut_at(palm, radii) for radii in self._cuts] or [None]
+        views: list[U8] = []
+        seen: set[int | None] = set()
+        # Shrinking comes first and once, with the longest piece of arm that any view keeps.
+        hand = palm.piece.copy() if cuts[-1] is not None else palm.piece
+        erase_arm(hand, cuts[-1])
+        x, y, width, height = cv2.boundingRect(hand)
+        scale = SMALL / max(width, height)
+        small = resize_mask(
+            hand[y : y + height, x : x + width],
+            max(1, round(width * scale)),
+            max(1, round(height * scale)),
+        )
+        for cut in reversed(cuts):
+            at: int | None = None
+            if cut is not None:
+                along_y = cut.side in ("bottom", "top")
+                at = round((cut.at - (y if along_y else x)) * scale)
+                at = min(max(at, 0), small.shape[0 if along_y else 1])
+                erase_arm(small, cut._replace(at=at))
+            if at not in seen:
+                seen.add(at)
+                views.extend(self._turned(small, turn) for turn in self._turns)
+        return np.stack(views)
+
+    def _turned(self, small: U8, turn: float) -> U8:
+        if turn == 0:
+            turned = small
+        else:
+            height, width = small.shape
+            cosine, sine = math.cos(turn), math.sin(turn)
+            cx, cy, middle = (width - 1) / 2, (height - 1) / 2, (_CANVAS - 1) / 2
+            matrix = np.array(
+                [
+                    [cosine, -sine, middle - cosine * cx + sine * cy],
+                    [sine, cosine, middle - sine * cx - cosine * cy],
+                ]
+            )
+            cv2.warpAffine(
+                small, matrix, (_CANVAS, _CANVAS), dst=self._canvas, flags=cv2.INTER_NEAREST
+            )
+            turned = self._canvas
+        x, y, width, height = cv2.boundingRect(turned)
+        if width == 0 or height == 0:
+            return np.zeros((self.height, self.width), np.uint8)
+        return resize_mask(turned[y : y + height, x : x + width], self.width, self.height)
