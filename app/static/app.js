@@ -1,0 +1,367 @@
+// The page, put together: core/ talks to the server, ui/ shows and asks, this file joins them.
+
+import { api } from "./core/api.js";
+import { CameraFeed } from "./core/camera-feed.js";
+import { FrameSender, grabStill } from "./core/frame-sender.js";
+import { changesFor, INITIAL_STATE } from "./core/messages.js";
+import { OperatorLink } from "./core/operator-link.js";
+import { SourceKeeper } from "./core/source-keeper.js";
+import { Stopper } from "./core/stopper.js";
+import { Store } from "./core/store.js";
+import { texts } from "./texts/en.js";
+import { dockButtons, steps, stopButton } from "./ui/dock.js";
+import { gestureList } from "./ui/gesture-list.js";
+import { connection, driver, goneOverlay, statePill } from "./ui/header.js";
+import { keys } from "./ui/keys.js";
+import { Notices } from "./ui/notices.js";
+import { operatorView, sourceChoices } from "./ui/operator-view.js";
+import { isDriving, keepRootClasses, preparePage } from "./ui/page.js";
+import { readout } from "./ui/readout.js";
+import { sentence } from "./ui/sentence.js";
+import { askContent, goneContent, helpContent, Sheets } from "./ui/sheets.js";
+import { stage } from "./ui/stage.js";
+import { teachContent } from "./ui/teach.js";
+import { describeError } from "./ui/words.js";
+
+const byId = (id) => document.getElementById(id);
+
+/** Small choices that outlive the page; a browser may refuse to keep them. */
+const memory = {
+    get(key) {
+        try {
+            return localStorage.getItem(`farhand-${key}`);
+        } catch {
+            return null;
+        }
+    },
+    set(key, value) {
+        try {
+            localStorage.setItem(`farhand-${key}`, value);
+        } catch {
+            // Then it is forgotten.
+        }
+    },
+};
+
+preparePage(document);
+const store = new Store(INITIAL_STATE);
+const link = new OperatorLink();
+const robotId = () => {
+    const robot = store.state.hello && store.state.hello.robot;
+    return robot && typeof robot === "object" ? robot.id : robot || null;
+};
+const stopper = new Stopper(link, api, robotId);
+const feeds = { wrist: new CameraFeed("wrist"), scene: new CameraFeed("scene") };
+const counts = { hello: 0, frame: 0, gesture: 0, robot: 0, gallery: 0, pong: 0, error: 0 };
+let lastError = null;
+
+// What is shown
+
+const root = document.documentElement;
+const sheets = new Sheets(byId("sheets"));
+const notices = new Notices(byId("notices"));
+keepRootClasses(root, store);
+statePill(byId("state-pill"), store);
+driver(byId("driver"), store);
+connection(byId("connection"), store);
+goneOverlay(byId("gone"), store, (kind) => goneContent(kind, () => link.retryNow()));
+steps(byId("steps"), store);
+dockButtons(byId("dock-buttons"), store);
+stopButton(byId("stop"), store);
+sentence(byId("sentence"), byId("sentence-spoken"), store);
+const video = operatorView(byId("operator"), store);
+gestureList(byId("gestures"), store, { templateUrl: api.templateUrl });
+readout(byId("readout"), store);
+const pressed = keys(root, {
+    closeSheet: () => sheets.close(),
+    canMove: () => Boolean(store.state.robot && store.state.robot.armed),
+});
+const views = stage(byId("stage"), store, { feeds, onFrame: pressed.listen, memory });
+
+const sender = new FrameSender(link, video);
+const source = new SourceKeeper(video, store, sender);
+
+// Sheets and notices end where the dock begins, however tall its words make it.
+new ResizeObserver(([entry]) => {
+    const height = entry.borderBoxSize[0].blockSize;
+    root.style.setProperty("--dock-height", `${Math.ceil(height)}px`);
+}).observe(byId("dock"), { box: "border-box" });
+
+// What the server says
+
+let hadSession = false;
+let signInCheck = 0;
+
+link.addEventListener("state", async ({ detail }) => {
+    if (detail.state === "open") sendView();
+    if (detail.state !== "open") sender.forget();
+    if (detail.state === "waiting") {
+        // A browser does not say why a WebSocket was refused; REST does.
+        const check = ++signInCheck;
+        try {
+            await api.robots();
+        } catch (error) {
+            if (error.status === 401 && check === signInCheck && !link.isOpen) {
+                store.set({ connection: { state: "signed-out" } });
+                return;
+            }
+        }
+        if (check !== signInCheck || link.isOpen) return;
+        if (store.state.connection.state === "signed-out") return;
+    }
+    if (detail.state === "connecting" && store.state.connection.state !== "open") {
+        // Trying again is no news: the words stay until the connection does something.
+        if (store.state.hello) return;
+    }
+    // "open" only once the server has said hello
+    if (detail.state === "open") return;
+    store.set({
+        connection: detail,
+        robot: null,
+        frame: null,
+        detail: null,
+        gesture: null,
+        wasArmed: false,
+    });
+});
+
+link.addEventListener("message", ({ detail: message }) => {
+    if (message.type in counts) counts[message.type] += 1;
+    const drove = isDriving(store.state);
+    const changes = changesFor(message, store.state, performance.now());
+    if (changes) store.set(changes);
+    if (message.type === "hello") greeted();
+    else if (message.type === "robot") {
+        stopper.saw(message);
+        if (drove && !isDriving(store.state) && !releasing) notices.show(texts.notices.lostControl);
+        if (!isDriving(store.state)) releasing = false;
+        describeRobot();
+    } else if (message.type === "frame") sender.answered(message.seq);
+    else if (message.type === "gallery") loadGestures();
+    else if (message.type === "error") refused(message);
+});
+
+function greeted() {
+    store.set({ connection: { state: "open" } });
+    if (hadSession) notices.show(texts.notices.reconnected, { name: "reconnected" });
+    hadSession = true;
+    describedAt = -Infinity;
+    describeRobot();
+    loadGestures();
+}
+
+function refused(message) {
+    lastError = message;
+    if (Number.isFinite(message.seq) && message.seq !== null) {
+        sender.answered(message.seq);
+        return; // a single frame; the next one comes at once
+    }
+    if (message.message) notices.show(message.message, { kind: "bad", name: message.code });
+}
+
+const DESCRIBE_EVERY_MS = 3000;
+let describedAt = -Infinity;
+
+/** The robot's limits and poses; asked again until it answers. */
+async function describeRobot() {
+    const robot = robotId();
+    const now = performance.now();
+    if (!robot || now - describedAt < DESCRIBE_EVERY_MS) return;
+    describedAt = now;
+    try {
+        const answer = await api.robot(robot);
+        const description = answer && (answer.description || answer);
+        if (description && Array.isArray(description.joints) && description.poses) {
+            describedAt = Infinity;
+            store.set({ description });
+        }
+    } catch {
+        // Not there yet; the read-out does without limits until then.
+    }
+}
+
+let gesturesRun = 0;
+
+async function loadGestures() {
+    const run = ++gesturesRun;
+    try {
+        const answer = await api.gestures();
+        if (run !== gesturesRun) return;
+        const version = store.state.galleryVersion + 1;
+        store.set({ gestures: answer, gesturesState: "ready", galleryVersion: version });
+    } catch {
+        if (run === gesturesRun) store.set({ gesturesState: "failed" });
+    }
+}
+
+/** Masks and distances cost the server a little: only while somebody looks. */
+function sendView() {
+    link.send("view", { detail: document.visibilityState !== "hidden" });
+}
+document.addEventListener("visibilitychange", () => {
+    sendView();
+    if (document.visibilityState !== "hidden") link.retryNow();
+});
+
+setInterval(() => {
+    const { latencyMs, rate, width, height } = sender;
+    store.set({ sender: { latencyMs, rate, width, height } });
+}, 250);
+
+// What the person wants
+
+let releasing = false;
+
+function takeControl(takeover = false) {
+    link.send("take_control", takeover ? { takeover: true } : {});
+}
+
+function toggleControl() {
+    const { robot } = store.state;
+    if (!robot) return;
+    if (isDriving(store.state)) {
+        releasing = true;
+        link.send("release_control");
+    } else if (robot.controller) {
+        const take = () => {
+            sheets.close();
+            takeControl(true);
+        };
+        const content = askContent(
+            texts.takeOver.words(robot.controller),
+            texts.actions.takeOver,
+            take,
+            () => sheets.close(),
+        );
+        sheets.show("take-over", texts.takeOver.title, content);
+    } else takeControl();
+}
+
+function toggleArm() {
+    if (!isDriving(store.state)) return;
+    link.send(store.state.robot.armed ? "disarm" : "arm");
+}
+
+async function chooseSource(wanted) {
+    const starting = sheets.name === "start";
+    if (starting) sheets.close();
+    if (wanted.kind === "none") {
+        source.stop();
+        return;
+    }
+    await source.start(wanted);
+    const { robot } = store.state;
+    // "Start driving" goes on by itself as far as nothing can move yet.
+    if (starting && store.state.source.state === "running" && robot && !robot.controller) {
+        takeControl();
+    }
+}
+
+function start() {
+    const host = byId("sheets");
+    const choices = sourceChoices(host, "start");
+    const box = document.createElement("div");
+    box.className = "choices-row";
+    box.append(...choices);
+    sheets.show("start", texts.actions.start, box, { focus: choices[0] });
+}
+
+function teach(gesture = null) {
+    const { content, focus, close } = teachContent({
+        gesture,
+        store,
+        video,
+        grab: () => grabStill(video),
+        recognise: api.recognise,
+        templateUrl: api.templateUrl,
+        act: {
+            create: api.createGesture,
+            update: api.updateGesture,
+            addSamples: api.addSamples,
+            remove: api.deleteGesture,
+        },
+        done(text) {
+            sheets.close();
+            notices.show(text, { kind: "good" });
+            loadGestures();
+        },
+    });
+    const title = gesture ? texts.teach.editTitle(gesture.name) : texts.teach.title;
+    sheets.show("teach", title, content, { onclose: close, focus });
+}
+
+async function reset() {
+    if (link.send("reset")) return;
+    try {
+        await api.resetRobot(robotId());
+    } catch (error) {
+        notices.show(describeError(error), { kind: "bad" });
+    }
+}
+
+stopper.addEventListener("state", ({ detail }) => {
+    store.set({ stopping: detail });
+    if (detail === "failed") {
+        notices.show(texts.stopFailed, { kind: "bad", name: "stop", stay: true });
+    } else notices.clear("stop");
+});
+
+const wishes = {
+    stop: () => stopper.stop(),
+    start,
+    reset,
+    source: chooseSource,
+    swap: () => views.swap(),
+    "toggle-control": toggleControl,
+    "toggle-arm": toggleArm,
+    help: () => {
+        if (sheets.name === "help") sheets.close();
+        else sheets.show("help", texts.help.title, helpContent());
+    },
+    "edit-gesture": ({ id }) => {
+        const gesture = store.state.gestures.find((candidate) => candidate.id === id);
+        if (gesture) teach(gesture);
+    },
+};
+
+root.addEventListener("farhand:want", ({ detail }) => wishes[detail.what](detail));
+byId("help-open").addEventListener("click", wishes.help);
+byId("teach-open").addEventListener("click", () => teach());
+
+/**
+ * For tests in a browser and for the curious; reads only. `robot`, `frame`, `gesture`, `hello` are
+ * the newest messages, `counts` how many of each type came, `frames` what became of the webcam's
+ * pictures, `pictures` how many each robot camera has shown, `error` the newest `error` message.
+ */
+window.farhand = Object.freeze({
+    get state() {
+        return { ...store.state };
+    },
+    get hello() {
+        return store.state.hello;
+    },
+    get robot() {
+        return store.state.robot;
+    },
+    get frame() {
+        return store.state.frame;
+    },
+    get gesture() {
+        return store.state.gesture;
+    },
+    get error() {
+        return lastError;
+    },
+    get counts() {
+        return { ...counts };
+    },
+    get frames() {
+        return { ...sender.counts, latencyMs: sender.latencyMs, rate: sender.rate };
+    },
+    get pictures() {
+        return { wrist: feeds.wrist.pictures, scene: feeds.scene.pictures };
+    },
+});
+
+link.open();
+source.listCameras();

@@ -1,0 +1,74 @@
+// The REST interface, as docs/protocol.md has it.
+
+/** What went wrong, with the server's own words where it gave some. */
+export class ApiError extends Error {
+    constructor(status, code, message, detail = null) {
+        super(message);
+        this.status = status; // 0: the server was not reached
+        this.code = code;
+        this.detail = detail;
+    }
+}
+
+async function request(method, path, { body, json, timeoutMs = 15000 } = {}) {
+    const init = { method, credentials: "same-origin", cache: "no-store" };
+    if (json !== undefined) {
+        init.headers = { "Content-Type": "application/json" };
+        init.body = JSON.stringify(json);
+    } else if (body !== undefined) {
+        init.body = body;
+    }
+    let answer;
+    try {
+        init.signal = AbortSignal.timeout(timeoutMs);
+        answer = await fetch(new URL(path, document.baseURI), init);
+    } catch {
+        throw new ApiError(0, "unreachable", "");
+    }
+    let data = null;
+    try {
+        data = await answer.json();
+    } catch {
+        // 204, or a proxy's own page
+    }
+    if (answer.ok) return data;
+    const error = (data && data.error) || {};
+    throw new ApiError(answer.status, error.code || "http", error.message || "", error.detail);
+}
+
+const id = encodeURIComponent;
+
+function imageForm(images) {
+    const form = new FormData();
+    images.forEach((image, index) => form.append("images", image, `still-${index + 1}.jpg`));
+    return form;
+}
+
+export const api = Object.freeze({
+    robots: () => request("GET", "api/robots"),
+    robot: (robot) => request("GET", `api/robots/${id(robot)}`),
+    stopRobot: (robot, timeoutMs) =>
+        request("POST", `api/robots/${id(robot)}/stop`, { timeoutMs }),
+    resetRobot: (robot) => request("POST", `api/robots/${id(robot)}/reset`),
+    gestures: () => request("GET", "api/gestures"),
+    createGesture(name, action, images) {
+        const form = imageForm(images);
+        form.append("name", name);
+        form.append("action", JSON.stringify(action));
+        return request("POST", "api/gestures", { body: form });
+    },
+    updateGesture: (gesture, changes) =>
+        request("PATCH", `api/gestures/${id(gesture)}`, { json: changes }),
+    addSamples: (gesture, images) =>
+        request("POST", `api/gestures/${id(gesture)}/samples`, { body: imageForm(images) }),
+    deleteGesture: (gesture) => request("DELETE", `api/gestures/${id(gesture)}`),
+    recognise(image) {
+        const form = new FormData();
+        form.append("image", image, "still.jpg");
+        return request("POST", "api/recognise", { body: form });
+    },
+    /** Address of a template's picture; `version` makes it new after a change. */
+    templateUrl(gesture, version, sample = 0) {
+        return `api/gestures/${id(gesture)}/template.png?sample=${sample}&v=${id(version)}`;
+    },
+});

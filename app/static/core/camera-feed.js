@@ -1,0 +1,58 @@
+// Pictures of one robot camera, newest first and only while wanted.
+
+import { unpackPicture } from "./protocol.js";
+import { ReconnectingSocket, socketUrl } from "./socket.js";
+
+/**
+ * Events: `picture` (detail: {bitmap, seq, tick}; the listener closes the bitmap).
+ * A picture that arrives while another is being decoded replaces the one that waits.
+ */
+export class CameraFeed extends EventTarget {
+    #socket;
+    #newest = null;
+    #decoding = false;
+
+    constructor(name) {
+        super();
+        this.name = name;
+        this.pictures = 0;
+        this.failures = 0; // tries in a row that brought no picture
+        this.#socket = new ReconnectingSocket(socketUrl(`ws/camera/${encodeURIComponent(name)}`));
+        this.#socket.addEventListener("state", (event) => {
+            if (event.detail.state === "waiting") this.failures += 1;
+        });
+        this.#socket.addEventListener("message", (event) => {
+            const picture = unpackPicture(event.detail);
+            if (!picture) return;
+            this.#newest = picture;
+            if (!this.#decoding) this.#decode();
+        });
+    }
+
+    open() {
+        this.#socket.open();
+    }
+
+    close() {
+        this.#newest = null;
+        this.#socket.close();
+    }
+
+    async #decode() {
+        this.#decoding = true;
+        while (this.#newest) {
+            const { jpeg, seq, tick } = this.#newest;
+            this.#newest = null;
+            try {
+                const bitmap = await createImageBitmap(new Blob([jpeg], { type: "image/jpeg" }));
+                this.pictures += 1;
+                this.failures = 0;
+                const detail = { bitmap, seq, tick };
+                this.dispatchEvent(new CustomEvent("picture", { detail }));
+            } catch {
+                // A broken picture is no picture; its age will show.
+            }
+        }
+        this.#decoding = false;
+    }
+}

@@ -1,0 +1,58 @@
+// The state of the page: one flat object, changed only through set().
+
+/**
+ * Listeners are told at most once a drawn picture, however many messages came in between: thirty
+ * frames a second from the server must not become thirty layouts a second on a slow laptop.
+ */
+export class Store {
+    #state;
+    #listeners = [];
+    #dirty = new Set();
+    #scheduled = false;
+
+    constructor(initial) {
+        this.#state = { ...initial };
+    }
+
+    /** The current values. Treat as read-only. */
+    get state() {
+        return this.#state;
+    }
+
+    /** Change some values; tells the listeners of those that really changed. */
+    set(patch) {
+        for (const [key, value] of Object.entries(patch)) {
+            if (Object.is(this.#state[key], value)) continue;
+            this.#state[key] = value;
+            this.#dirty.add(key);
+        }
+        if (this.#dirty.size) this.#schedule();
+    }
+
+    /** Call `listener(state)` now, and again after any of `keys` changed. */
+    watch(keys, listener) {
+        this.#listeners.push({ keys, listener });
+        listener(this.#state);
+    }
+
+    #schedule() {
+        if (this.#scheduled) return;
+        this.#scheduled = true;
+        const run = () => {
+            if (!this.#scheduled) return;
+            this.#scheduled = false;
+            this.#flush();
+        };
+        requestAnimationFrame(run);
+        // Nothing is drawn while the page is hidden, but its state goes on.
+        setTimeout(run, 250);
+    }
+
+    #flush() {
+        const dirty = this.#dirty;
+        this.#dirty = new Set();
+        for (const { keys, listener } of this.#listeners) {
+            if (keys.some((key) => dirty.has(key))) listener(this.#state);
+        }
+    }
+}

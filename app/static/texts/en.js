@@ -1,0 +1,357 @@
+// Every word of the page, in English. Another language is another file like this one.
+
+export const language = "en";
+
+const plural = (count, one, many) => `${count} ${count === 1 ? one : many}`;
+
+export const texts = Object.freeze({
+    title: "Farhand",
+    skip: "Skip to the cockpit",
+    stop: "STOP",
+    stopHint: "Space",
+    stopLabel: "Stop the robot",
+    stopStates: {
+        sending: "Stopping…",
+        stopped: "Stopped",
+        failed: "Not confirmed",
+    },
+    stopFailed:
+        "The stop was not confirmed. Press STOP again, or cover the camera: without frames the " +
+        "robot stops by itself.",
+
+    headings: {
+        header: "State",
+        stage: "Robot",
+        operator: "Your hand",
+        gestures: "Gestures",
+        readout: "Arm",
+        dock: "Controls",
+    },
+
+    modes: {
+        unknown: "No robot",
+        disarmed: "Disarmed",
+        armed: "Armed",
+        moving: "Moving",
+        holding: "Holding",
+        stopped: "Stopped",
+        faulted: "Fault",
+    },
+
+    driver: {
+        nobody: "Nobody drives",
+        you: "You drive",
+        other: (name) => `${name} drives, you watch`,
+    },
+
+    connection: {
+        connecting: "Connecting…",
+        open: "Connected",
+        waiting: (seconds) => `No server, next try in ${seconds} s`,
+        "signed-out": "Signed out",
+        latency: (ms) => `${ms} ms`,
+        latencyLabel: "From the camera picture to its answer",
+    },
+
+    gone: {
+        title: "The server does not answer",
+        words:
+            "The robot stops by itself when no frames reach it. Nothing is armed when the " +
+            "connection comes back.",
+        retry: "Try now",
+        signedOutTitle: "You are signed out",
+        signedOutWords:
+            "Open the link that the server printed when it started. It signs this browser in.",
+        reload: "Load the page again",
+    },
+
+    steps: { source: "Picture", control: "Control", armed: "Armed" },
+
+    actions: {
+        start: "Start driving",
+        take: "Take control",
+        takeOver: "Take over",
+        release: "Release",
+        arm: "Arm",
+        disarm: "Disarm",
+        reset: "Reset",
+        teach: "Teach a gesture",
+        help: "Help",
+        close: "Close",
+        cancel: "Cancel",
+        retry: "Try again",
+    },
+
+    takeOver: {
+        title: "Take over?",
+        words: (name) =>
+            `${name} drives now. If you take over, the arm stops first and has to be armed again.`,
+    },
+
+    sentence: {
+        connecting: "Connecting to the server…",
+        gone: "The connection is lost. The robot stops by itself; trying to reach the server.",
+        signedOut: "Signed out. Open the link that the server printed.",
+        noRobot: "The robot does not answer yet.",
+        fault: (why) => `The robot is in trouble: ${why}`,
+        faultUnknown: "no reason given",
+        stopped: (why) => (why ? `Stopped: ${why}.` : "Stopped."),
+        stoppedNext: "Reset when it is safe to go on; nothing moves by that.",
+        noSource: "Show the robot a hand: use your camera, or try it without one.",
+        sourceStarting: "Waiting for the camera. Allow it in the browser if asked.",
+        noControl: "Take control to drive.",
+        otherDrives: (name) => `${name} drives. You watch; your gestures move nothing.`,
+        disarmed: "Arm the robot, and gestures move it.",
+        disarmedWhy: (why) => `Disarmed: ${why}. Arm to go on.`,
+        holding: (why) => (why ? `Holding still: ${why}.` : "Holding still."),
+        holdingNext: "Show no gesture for half a second, then show it again.",
+        noFrames: "No pictures reach the server. Is the camera covered or the page hidden?",
+        waitingPicture: "Waiting for the first pictures…",
+        ready: "Ready. Show a gesture.",
+        moving: (what) => `Moving: ${what}.`,
+        movingHold: (gesture, what) => `“${gesture}”: ${what}, while you hold it.`,
+        done: (gesture) => `“${gesture}” is done. Lower your hand, then show the next one.`,
+        seen: (gesture) => `Sees “${gesture}”.`,
+        seenIdle: (gesture, next) => `Sees “${gesture}”. ${next}`,
+        limits: (limits) => `Limit: ${limits}.`,
+    },
+
+    stage: {
+        views: { wrist: "Wrist camera", scene: "Scene camera", "3d": "3D view" },
+        enlarge: (view) => `Make the ${view} large`,
+        noPicture: "No picture yet",
+        noCamera: "The camera does not answer",
+        age: (seconds) => `${seconds} s old`,
+        hide: "Hide the 3D view",
+        show: "Show the 3D view",
+        no3d: "This browser cannot draw 3D here (WebGL is off). The camera pictures do the same.",
+        loading3d: "Loading the 3D view…",
+        failed3d: "The 3D view did not load.",
+    },
+
+    operator: {
+        useCamera: "Use my camera",
+        useCameraWords: "Your picture goes to this server only, and is not kept.",
+        trySynthetic: "No camera? Try it",
+        trySyntheticWords: "A drawn hand shows the gestures, over and over.",
+        choose: "Camera",
+        otherCamera: (number) => `Camera ${number}`,
+        stop: "Turn off",
+        demonstration: "Demonstration: a drawn hand, not a camera",
+        asking: "Waiting for the camera…",
+        shows: (gesture) => `Shows “${gesture}”`,
+        showsNothing: "Between two gestures",
+        templateLabel: "What is compared: 60 by 80 points",
+        template: "Template",
+        found: "Seen",
+        motion: "Motion",
+        motionStill: (percent) => `${percent}, still`,
+        motionMoving: (percent) => `${percent}, moving`,
+        rate: "Frames",
+        rateValue: (rate) => `${rate} a second`,
+        answer: "Answer",
+        nothing: "no gesture",
+        distance: (distance) => `distance ${distance}`,
+        previewLabel: "Your picture, mirrored, with the hand that was found",
+    },
+
+    sourceErrors: {
+        denied: {
+            title: "The browser keeps the camera closed",
+            words:
+                "Allow the camera for this page (the camera sign in the address bar), then try " +
+                "again. Or go on without one.",
+        },
+        none: {
+            title: "No camera was found",
+            words: "Plug one in and try again, or go on without one.",
+        },
+        busy: {
+            title: "Another program uses the camera",
+            words: "Close the other program or tab that shows it, then try again.",
+        },
+        gone: {
+            title: "That camera is not there any more",
+            words: "Choose another one, or try again.",
+        },
+        unplugged: {
+            title: "The camera was unplugged",
+            words: "The robot holds still. Plug the camera in again, then try again.",
+        },
+        insecure: {
+            title: "This address is not safe enough for a camera",
+            words:
+                "Browsers open the camera only on https:// or on localhost. Open the page that " +
+                "way, or go on without a camera.",
+        },
+        unsupported: {
+            title: "This browser gives no camera to pages",
+            words: "Use a current browser, or go on without a camera.",
+        },
+        clip: {
+            title: "The demonstration could not be played",
+            words: "The server did not send the clip, or this browser cannot play WebM.",
+        },
+        failed: {
+            title: "The camera could not be opened",
+            words: "Try again. If that does not help, choose another camera.",
+        },
+    },
+
+    gestures: {
+        legend: "A longer bar is closer; past the mark it counts.",
+        empty: "No gesture is enrolled yet. Teach the first one.",
+        loading: "Loading the gestures…",
+        failed: "The gestures could not be loaded.",
+        edit: (name) => `Change “${name}”`,
+        match: "Recognised",
+        distanceLabel: (distance) => `distance ${distance}`,
+        noDistance: "–",
+    },
+
+    readout: {
+        joint: (number) => `J${number}`,
+        jointLabel: (number, value) => `Joint ${number}: ${value}`,
+        gripper: "Gripper",
+        gripperOpen: (width) => `${width} mm open`,
+        tool: "Tool",
+        toolValue: (x, y, z) => `x ${x}  y ${y}  z ${z} cm`,
+        doing: "Doing",
+        nothing: "nothing",
+        loop: "Loop",
+    },
+
+    action: {
+        straight: {
+            base: { "x+": "forward", "x-": "back", "y+": "left", "y-": "right", "z+": "up", "z-": "down" },
+            tool: {
+                "x+": "along tool x",
+                "x-": "against tool x",
+                "y+": "along tool y",
+                "y-": "against tool y",
+                "z+": "along tool z",
+                "z-": "against tool z",
+            },
+        },
+        linear: (direction, speed) => `${direction} ${speed} cm/s`,
+        angular: (axis, speed) => `turn about ${axis} ${speed}°/s`,
+        jogJoint: (joint, speed) => `turn joint ${joint} ${speed}°/s`,
+        turnJoint: (joint, angle) => `turn joint ${joint} by ${angle}°`,
+        pose: (name) => `go to “${name}”`,
+        open: "open gripper",
+        closed: "close gripper",
+        gripper: (width) => `gripper to ${width} mm`,
+        home: "go home",
+        stop: "stop the robot",
+        stand: "stand still",
+        lasting: (what, seconds) => `${what} for ${seconds} s`,
+        sequence: (first, more) => (more ? `${first}, then ${plural(more, "step", "steps")}` : first),
+        unknown: "unknown action",
+    },
+
+    teach: {
+        title: "Teach a gesture",
+        editTitle: (name) => `Change “${name}”`,
+        name: "Name",
+        nameHint: "1 to 60 characters, such as “wave”",
+        nameMissing: "Give the gesture a name.",
+        action: "What the robot does",
+        pictures: "Pictures of the hand",
+        picturesHint: "One is enough; three from slightly different sides are better.",
+        morePictures: "Add pictures",
+        enrolled: (count) => plural(count, "picture enrolled", "pictures enrolled"),
+        capture: "Take a picture",
+        captureThree: "Take three",
+        captureCancel: "Stop the countdown",
+        countdown: (number) => `Hold your hand still: ${number}`,
+        noSource: "Turn on your camera first (under “Your hand”).",
+        stillsMissing: "Take at least one picture of the hand.",
+        still: (number) => `Picture ${number}`,
+        removeStill: (number) => `Remove picture ${number}`,
+        checking: "checking…",
+        stillGood: "hand found",
+        stillResembles: (name) => `hand found; looks like “${name}”`,
+        resembles: (name) =>
+            `This hand looks like “${name}”. A shape further away is told apart more safely.`,
+        save: "Save gesture",
+        saveChanges: "Save changes",
+        saving: "Saving…",
+        saved: (name) => `“${name}” is saved.`,
+        deleted: (name) => `“${name}” is deleted.`,
+        delete: "Delete",
+        deleteAsk: (name) => `Delete “${name}” and its pictures? This cannot be undone.`,
+        deleteYes: "Yes, delete",
+        deleteNo: "Keep it",
+    },
+
+    actionForm: {
+        kind: "Action",
+        kinds: {
+            straight: "Move in a straight line, while held",
+            exact: "Move and turn with exact speeds, while held",
+            jog_joint: "Turn one joint, while held",
+            turn_joint: "Turn one joint by an angle",
+            pose: "Go to a pose",
+            gripper: "Open or close the gripper",
+            home: "Go home",
+            stop: "Stop the robot",
+            sequence: "Several steps, one after another",
+        },
+        direction: "Direction",
+        frame: "Seen from",
+        frames: { base: "the robot's base", tool: "the tool" },
+        speed: "Speed, cm/s",
+        jointSpeed: "Speed, °/s (below 0: the other way)",
+        joint: "Joint",
+        angle: "Angle, ° (below 0: the other way)",
+        pose: "Pose",
+        width: "Opening, mm (0: closed)",
+        linear: (axis) => `Along ${axis}, cm/s`,
+        angular: (axis) => `About ${axis}, °/s`,
+        duration: "For how long, s",
+        step: (number) => `Step ${number}`,
+        addStep: "Add a step",
+        removeStep: (number) => `Remove step ${number}`,
+        upStep: (number) => `Move step ${number} up`,
+    },
+
+    errors: {
+        unreachable: "The server does not answer. Try again when the connection is back.",
+        not_signed_in: "You are signed out. Open the link that the server printed.",
+        duplicate: "That name is taken. Choose another one.",
+        too_large: "The pictures are too large for the server.",
+        other: (status) => `The server said no (${status}).`,
+        server: (words) => `${words}`,
+        reset: "The reset was not accepted.",
+    },
+
+    notices: {
+        reconnected: "Connected again. Take control and arm to drive on.",
+        lostControl: "You no longer drive.",
+        dismiss: "Dismiss",
+    },
+
+    help: {
+        title: "Help",
+        how: [
+            "Start driving: choose your camera, or the drawn hand if you have none.",
+            "Take control: only one person drives at a time.",
+            "Arm: from now on your gestures move the robot.",
+            "Show a gesture and keep still. The robot moves while you hold it, and stops when you lower your hand.",
+        ],
+        keysTitle: "Keys",
+        keys: [
+            ["Space", "Stop"],
+            ["Esc", "Stop"],
+            ["A", "Arm or disarm"],
+            ["C", "Take or release control"],
+            ["W", "Swap wrist and scene"],
+            ["?", "This help"],
+        ],
+        keysNote: "Space always stops; press buttons with Enter. Keys do nothing while you type in a field.",
+        safetyTitle: "About stopping",
+        safety:
+            "The stop goes over a network. It is not an emergency stop in the sense of ISO 13850. " +
+            "If pictures stop coming, whatever the cause, the robot stands still within half a second.",
+    },
+});

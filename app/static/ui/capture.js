@@ -1,0 +1,155 @@
+// Taking still pictures of the hand, with a countdown, and saying at once whether one is usable.
+
+import { texts } from "../texts/en.js";
+import { button, el, setLabel, setText } from "./dom.js";
+import { describeError } from "./words.js";
+
+const words = texts.teach;
+const COUNT_FROM = 3;
+const COUNT_MS = 800;
+const BETWEEN_MS = 900;
+const MOST = 8;
+
+const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+
+/**
+ * `video` is the source that plays now; `grab()` gives its picture as a JPEG Blob or null;
+ * `recognise(blob)` says what the server sees in it. `stills` holds the Blobs taken.
+ */
+export class Capture {
+    #run = 0;
+    #counting = false;
+
+    constructor({ video, store, grab, recognise, ownName }) {
+        this.store = store;
+        this.grab = grab;
+        this.recognise = recognise;
+        this.ownName = ownName;
+        this.video = video;
+        this.entries = [];
+        this.preview = el("canvas", { class: "capture-preview", "aria-hidden": "true" });
+        this.counter = el("p", { class: "capture-count", role: "status" });
+        this.note = el("p", { class: "problem-line", role: "status" });
+        this.list = el("ul", { class: "stills" });
+        this.one = button(words.capture, {
+            id: "capture-one",
+            iconName: "camera",
+            onclick: () => (this.#counting ? this.#cancel() : this.#take(1)),
+        });
+        this.three = button(words.captureThree, { id: "capture-three", onclick: () => this.#take(3) });
+        this.element = el(
+            "div",
+            { class: "capture" },
+            el("div", { class: "capture-frame" }, this.preview, this.counter),
+            el("div", { class: "row" }, this.one, this.three),
+            this.note,
+            this.list,
+        );
+        this.timer = setInterval(() => this.#drawPreview(), 66);
+        this.#drawPreview();
+    }
+
+    get stills() {
+        return this.entries.map(({ blob }) => blob);
+    }
+
+    /** Stop the countdown and the preview. */
+    close() {
+        this.#run += 1;
+        clearInterval(this.timer);
+    }
+
+    clear() {
+        this.entries = [];
+        this.#draw();
+    }
+
+    #running() {
+        return this.store.state.source.state === "running" && this.video.videoWidth > 0;
+    }
+
+    #drawPreview() {
+        const running = this.#running();
+        this.element.classList.toggle("no-source", !running);
+        this.one.disabled = !running || this.entries.length >= MOST;
+        this.three.disabled = !running || this.#counting || this.entries.length > MOST - 3;
+        setLabel(this.one, this.#counting ? words.captureCancel : words.capture);
+        if (!running) {
+            if (this.#counting) this.#cancel();
+            setText(this.counter, words.noSource);
+            return;
+        }
+        if (!this.#counting) setText(this.counter, "");
+        const { videoWidth: width, videoHeight: height } = this.video;
+        if (this.preview.width !== 320) this.preview.width = 320;
+        const tall = Math.round((320 * height) / width);
+        if (this.preview.height !== tall) this.preview.height = tall;
+        this.preview.getContext("2d").drawImage(this.video, 0, 0, 320, tall);
+    }
+
+    #cancel() {
+        this.#run += 1;
+        this.#counting = false;
+        setText(this.counter, "");
+    }
+
+    async #take(count) {
+        const run = ++this.#run;
+        this.#counting = true;
+        for (let left = COUNT_FROM; left > 0; left -= 1) {
+            setText(this.counter, words.countdown(left));
+            await wait(COUNT_MS);
+            if (run !== this.#run) return;
+        }
+        for (let taken = 0; taken < count; taken += 1) {
+            if (taken) await wait(BETWEEN_MS);
+            if (run !== this.#run) return;
+            const blob = await this.grab();
+            if (run !== this.#run) return;
+            if (blob) this.#add(blob);
+        }
+        this.#counting = false;
+        setText(this.counter, "");
+    }
+
+    async #add(blob) {
+        const canvas = el("canvas", { width: 96, height: 72 });
+        const verdict = el("p", { class: "still-verdict", text: words.checking });
+        const remove = button("", { class: "round small", iconName: "close" });
+        const item = el("li", {}, canvas, verdict, remove);
+        const entry = { blob, item, remove };
+        remove.addEventListener("click", () => {
+            this.entries = this.entries.filter((other) => other !== entry);
+            this.#draw();
+        });
+        this.entries.push(entry);
+        this.#draw();
+        const bitmap = await createImageBitmap(blob);
+        const scale = Math.min(96 / bitmap.width, 72 / bitmap.height);
+        const [width, height] = [bitmap.width * scale, bitmap.height * scale];
+        canvas.getContext("2d").drawImage(bitmap, (96 - width) / 2, (72 - height) / 2, width, height);
+        bitmap.close();
+        try {
+            const answer = await this.recognise(blob);
+            const match = answer && answer.match;
+            const accepted = match && match.gesture && match.accepted !== false;
+            const other = accepted && match.gesture !== this.ownName() ? match.gesture : null;
+            item.classList.add("is-good");
+            setText(verdict, other ? words.stillResembles(other) : words.stillGood);
+            setText(this.note, other ? words.resembles(other) : "");
+        } catch (error) {
+            item.classList.add("is-bad");
+            setText(verdict, describeError(error));
+        }
+    }
+
+    #draw() {
+        this.list.replaceChildren(
+            ...this.entries.map(({ item, remove }, index) => {
+                remove.setAttribute("aria-label", words.removeStill(index + 1));
+                return item;
+            }),
+        );
+        if (!this.entries.length) setText(this.note, "");
+    }
+}

@@ -1,0 +1,87 @@
+// Making elements. Words from the server only ever become text, never markup.
+
+const SVG = "http://www.w3.org/2000/svg";
+const ICONS = "static/icons/icons.svg";
+
+/** An SVG icon from the sheet icons/icons.svg; decoration only, so hidden from readers. */
+export function icon(name) {
+    const svg = document.createElementNS(SVG, "svg");
+    svg.setAttribute("class", "icon");
+    svg.setAttribute("aria-hidden", "true");
+    const use = document.createElementNS(SVG, "use");
+    use.setAttribute("href", `${ICONS}#${name}`);
+    svg.append(use);
+    return svg;
+}
+
+/** Show another icon in an element made by icon(). */
+export function setIcon(svg, name) {
+    const href = `${ICONS}#${name}`;
+    const use = svg.firstChild;
+    if (use.getAttribute("href") !== href) use.setAttribute("href", href);
+}
+
+/**
+ * An element: el("p", {class: "quiet", text: "…", data: {test: "x"}}, child, child).
+ * Keys beginning with "on" are listeners; the others are attributes (false and null: left out).
+ */
+export function el(tag, properties = {}, ...children) {
+    const element = document.createElement(tag);
+    for (const [key, value] of Object.entries(properties)) {
+        if (value === null || value === undefined || value === false) continue;
+        if (key === "text") element.textContent = value;
+        else if (key === "data") Object.assign(element.dataset, value);
+        else if (key.startsWith("on")) element.addEventListener(key.slice(2), value);
+        else element.setAttribute(key, value === true ? "" : value);
+    }
+    element.append(...children.filter((child) => child !== null && child !== undefined));
+    return element;
+}
+
+export function button(label, { iconName = null, ...properties } = {}) {
+    return el(
+        "button",
+        { type: "button", ...properties },
+        iconName ? icon(iconName) : null,
+        el("span", { class: "label", text: label }),
+    );
+}
+
+/** Change text only when it differs: readers and layout are left alone otherwise. */
+export function setText(element, text) {
+    if (element.textContent !== text) element.textContent = text;
+}
+
+export function setLabel(buttonElement, label) {
+    setText(buttonElement.querySelector(".label"), label);
+}
+
+export function part(root, name) {
+    const found = root.querySelector(`[data-part="${name}"]`);
+    if (!found) throw new Error(`no part "${name}" in #${root.id}`);
+    return found;
+}
+
+/** Tell the page what the person wants: "farhand:want" with detail {what, ...}. */
+export function want(element, what, detail = {}) {
+    element.dispatchEvent(
+        new CustomEvent("farhand:want", { bubbles: true, detail: { what, ...detail } }),
+    );
+}
+
+/** Whether keys belong to this element: somebody types in it or chooses with it. */
+export function isField(element) {
+    // Not `instanceof`: the 3D view's frame has an Element class of its own.
+    const fields = "input, textarea, select, [contenteditable]";
+    return Boolean(element && element.closest && element.closest(fields));
+}
+
+/** A picture in base64 as an ImageBitmap; null when it is none. */
+export async function bitmapFromBase64(text, type = "image/png") {
+    try {
+        const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+        return await createImageBitmap(new Blob([bytes], { type }));
+    } catch {
+        return null;
+    }
+}

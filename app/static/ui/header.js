@@ -1,0 +1,85 @@
+// The bar at the top: state of the robot, who drives, connection.
+
+import { texts } from "../texts/en.js";
+import { part, setIcon, setText } from "./dom.js";
+import { isDriving, modeOf } from "./page.js";
+
+/** State in a word, a colour and a shape. */
+export function statePill(element, store) {
+    const icon = part(element, "icon");
+    const word = part(element, "word");
+    store.watch(["connection", "robot"], (state) => {
+        const mode = modeOf(state);
+        element.dataset.mode = mode;
+        setIcon(icon, `mode-${mode}`);
+        setText(word, texts.modes[mode]);
+    });
+}
+
+/** Who drives. */
+export function driver(element, store) {
+    const words = part(element, "words");
+    store.watch(["connection", "hello", "robot"], (state) => {
+        const controller = state.robot && state.robot.controller;
+        element.hidden = state.connection.state !== "open" || !state.robot;
+        element.classList.toggle("is-you", isDriving(state));
+        if (isDriving(state)) setText(words, texts.driver.you);
+        else setText(words, controller ? texts.driver.other(controller) : texts.driver.nobody);
+    });
+}
+
+/** Connection to the server, and how long an answer takes. */
+export function connection(element, store) {
+    const icon = part(element, "icon");
+    const words = part(element, "words");
+    const latency = part(element, "latency");
+    latency.title = texts.connection.latencyLabel;
+
+    function draw(state) {
+        const { state: name, retryAt } = state.connection;
+        element.dataset.state = name;
+        setIcon(icon, name === "open" ? "link" : "nolink");
+        const text = texts.connection[name] || "";
+        const seconds = Math.max(1, Math.ceil(((retryAt || 0) - performance.now()) / 1000));
+        setText(words, typeof text === "function" ? text(seconds) : text);
+        const ms = state.sender.latencyMs;
+        const shown = name === "open" && Number.isFinite(ms) && ms !== null;
+        setText(latency, shown ? texts.connection.latency(Math.round(ms)) : "");
+    }
+
+    store.watch(["connection", "sender"], draw);
+    setInterval(() => {
+        if (store.state.connection.state === "waiting") draw(store.state);
+    }, 500);
+}
+
+const OVERLAY_AFTER_MS = 1200; // a short break is not worth a curtain
+
+/** Says plainly that the server is gone. Leaves the dock with the stop button free. */
+export function goneOverlay(element, store, build) {
+    let timer = 0;
+    let shown = "";
+    store.watch(["connection"], ({ connection: link }) => {
+        const open = link.state === "open";
+        if (open) {
+            clearTimeout(timer);
+            timer = 0;
+            shown = "";
+            element.hidden = true;
+            return;
+        }
+        const kind = link.state === "signed-out" ? "signedOut" : "gone";
+        const show = () => {
+            if (shown === kind) return;
+            shown = kind;
+            element.replaceChildren(build(kind));
+            element.hidden = false;
+        };
+        if (kind === "signedOut") show();
+        else if (!timer) {
+            timer = setTimeout(() => {
+                if (store.state.connection.state !== "open") show();
+            }, OVERLAY_AFTER_MS);
+        } else if (shown) show();
+    });
+}

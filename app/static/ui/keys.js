@@ -1,0 +1,47 @@
+// Keys that work from anywhere on the page, and from inside the 3D view's frame.
+
+import { isField, want } from "./dom.js";
+
+const LETTERS = { a: "toggle-arm", c: "toggle-control", w: "swap", "?": "help" };
+
+/**
+ * Space and Escape stop, whatever has the focus, unless somebody types in a field (Escape then
+ * leaves the field). `closeSheet` closes what lies over the page and says whether there was
+ * something; where nothing can move, Escape does only that.
+ */
+export function keys(root, { closeSheet, canMove }) {
+    let swallowed = false;
+
+    function down(event) {
+        if (event.ctrlKey || event.metaKey || event.altKey || event.isComposing) return;
+        const typing = isField(event.target);
+        if (event.key === "Escape") {
+            if (typing) {
+                event.target.blur();
+            } else if (!event.repeat) {
+                const closed = closeSheet();
+                if (!closed || canMove()) want(root, "stop");
+            }
+            event.preventDefault();
+        } else if (event.key === " " && !typing) {
+            event.preventDefault(); // neither scrolls nor presses what has the focus
+            swallowed = true;
+            if (!event.repeat) want(root, "stop");
+        } else if (!typing && !event.repeat && LETTERS[event.key.toLowerCase()]) {
+            want(root, LETTERS[event.key.toLowerCase()]);
+        }
+    }
+
+    function up(event) {
+        if (event.key === " " && swallowed) event.preventDefault();
+        if (event.key === " ") swallowed = false;
+    }
+
+    function listen(target) {
+        target.addEventListener("keydown", down, true);
+        target.addEventListener("keyup", up, true);
+    }
+
+    listen(window);
+    return { listen };
+}

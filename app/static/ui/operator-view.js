@@ -1,0 +1,261 @@
+// The operator's own picture, what was found in it, and where it comes from.
+
+import { texts } from "../texts/en.js";
+import { bitmapFromBase64, button, el, icon, part, setText, want } from "./dom.js";
+import { number, percent, short } from "./words.js";
+
+const words = texts.operator;
+const STALE_MS = 600;
+
+/** The box, the mask's tint and the corners, drawn over the video in the frame's own pixels. */
+class Overlay {
+    constructor(canvas) {
+        this.canvas = canvas;
+        this.context = canvas.getContext("2d");
+        this.tint = document.createElement("canvas");
+        this.mask = false;
+    }
+
+    setMask(bitmap, colour) {
+        this.mask = Boolean(bitmap);
+        if (!bitmap) return;
+        const { tint } = this;
+        tint.width = bitmap.width;
+        tint.height = bitmap.height;
+        const context = tint.getContext("2d", { willReadFrequently: true });
+        context.drawImage(bitmap, 0, 0);
+        bitmap.close();
+        // White is hand: turn brightness into opacity, then colour what is left.
+        const pixels = context.getImageData(0, 0, tint.width, tint.height);
+        for (let at = 0; at < pixels.data.length; at += 4) {
+            pixels.data[at + 3] = pixels.data[at] > 127 ? 255 : 0;
+        }
+        context.putImageData(pixels, 0, 0);
+        context.globalCompositeOperation = "source-in";
+        context.fillStyle = colour;
+        context.fillRect(0, 0, tint.width, tint.height);
+        context.globalCompositeOperation = "source-over";
+    }
+
+    draw(width, height, roi, colour, recognised) {
+        const { canvas, context } = this;
+        if (canvas.width !== width || canvas.height !== height) {
+            canvas.width = width;
+            canvas.height = height;
+        }
+        context.clearRect(0, 0, width, height);
+        if (this.mask) {
+            context.globalAlpha = 0.3;
+            context.drawImage(this.tint, 0, 0, width, height);
+            context.globalAlpha = 1;
+        }
+        if (!Array.isArray(roi) || roi.length !== 4) return;
+        const [x, y, w, h] = roi;
+        context.strokeStyle = "rgba(0, 0, 0, 0.55)";
+        context.lineWidth = recognised ? 9 : 6;
+        context.strokeRect(x, y, w, h);
+        context.strokeStyle = colour;
+        context.lineWidth = recognised ? 5 : 2.5;
+        context.setLineDash(recognised ? [] : [10, 8]);
+        context.strokeRect(x, y, w, h);
+        context.setLineDash([]);
+    }
+
+    clear() {
+        this.mask = false;
+        this.context.clearRect(0, 0, this.canvas.width, this.canvas.height);
+    }
+}
+
+function choice(iconName, title, text, id, onclick) {
+    return el(
+        "button",
+        { type: "button", class: "choice", id, onclick },
+        icon(iconName),
+        el("span", { class: "choice-title", text: title }),
+        el("span", { class: "choice-words", text }),
+    );
+}
+
+/** The two ways to give the robot pictures; also used by the "start driving" sheet. */
+export function sourceChoices(element, prefix) {
+    return [
+        choice("camera", words.useCamera, words.useCameraWords, `${prefix}-camera`, () =>
+            want(element, "source", { kind: "camera" }),
+        ),
+        choice("hand", words.trySynthetic, words.trySyntheticWords, `${prefix}-synthetic`, () =>
+            want(element, "source", { kind: "synthetic" }),
+        ),
+    ];
+}
+
+function sourceProblem(element, code) {
+    const { title, words: text } = texts.sourceErrors[code] || texts.sourceErrors.failed;
+    return [
+        el(
+            "div",
+            { class: "problem", role: "alert" },
+            el("p", { class: "problem-title", text: title }),
+            el("p", { text }),
+        ),
+        el(
+            "div",
+            { class: "row" },
+            button(texts.actions.retry, {
+                id: "source-retry",
+                class: "primary",
+                onclick: () => want(element, "source", { kind: "again" }),
+            }),
+            button(words.trySynthetic, {
+                id: "source-instead",
+                onclick: () => want(element, "source", { kind: "synthetic" }),
+            }),
+        ),
+    ];
+}
+
+function seenPanel(element) {
+    const template = el("canvas", {
+        class: "template",
+        id: "template",
+        width: 60,
+        height: 80,
+        role: "img",
+        "aria-label": words.templateLabel,
+    });
+    const fact = (name, label) => {
+        const value = el("dd", { id: `seen-${name}`, text: "–" });
+        return [value, el("div", {}, el("dt", { text: label }), value)];
+    };
+    const [found, foundRow] = fact("match", words.found);
+    const [motion, motionRow] = fact("motion", words.motion);
+    const [rate, rateRow] = fact("rate", words.rate);
+    const [answer, answerRow] = fact("answer", words.answer);
+    element.append(
+        el("figure", {}, template, el("figcaption", { text: words.template })),
+        el("dl", { class: "facts" }, foundRow, motionRow, rateRow, answerRow),
+    );
+    return { template, found, motion, rate, answer };
+}
+
+/** Fills the operator's card; returns the <video> that sources play in. */
+export function operatorView(element, store) {
+    const video = part(element, "video");
+    const glass = part(element, "glass");
+    const badge = part(element, "badge");
+    const caption = part(element, "caption");
+    const choices = part(element, "choices");
+    const cameras = part(element, "cameras");
+    const overlay = new Overlay(part(element, "overlay"));
+    const panel = seenPanel(part(element, "seen"));
+    const templateContext = panel.template.getContext("2d");
+    glass.setAttribute("role", "img");
+    glass.setAttribute("aria-label", words.previewLabel);
+    setText(badge, words.demonstration);
+
+    part(element, "stop").addEventListener("click", () =>
+        want(element, "source", { kind: "none" }),
+    );
+    cameras.addEventListener("change", () =>
+        want(element, "source", { kind: "camera", deviceId: cameras.value }),
+    );
+
+    let drawn = null;
+    store.watch(["source"], ({ source }) => {
+        element.dataset.state = source.state;
+        element.dataset.kind = source.kind || "";
+        const look = `${source.state} ${source.error || ""}`;
+        if (look !== drawn) {
+            drawn = look;
+            if (source.state === "none") {
+                choices.replaceChildren(...sourceChoices(element, "choose"));
+            } else if (source.state === "starting") {
+                choices.replaceChildren(el("p", { class: "waiting", text: words.asking }));
+            } else if (source.state === "error") {
+                choices.replaceChildren(...sourceProblem(element, source.error));
+            } else {
+                choices.replaceChildren();
+            }
+        }
+    });
+
+    store.watch(["cameras", "source"], (state) => {
+        const list = state.cameras;
+        const usable = list.filter((camera) => camera.id);
+        const options = usable.map((camera, index) =>
+            el("option", { value: camera.id, text: camera.label || words.otherCamera(index + 1) }),
+        );
+        const key = usable.map((camera) => camera.id + camera.label).join();
+        if (cameras.dataset.key !== key) {
+            cameras.dataset.key = key;
+            cameras.replaceChildren(...options);
+        }
+        cameras.hidden = state.source.kind !== "camera" || usable.length < 2;
+        if (state.source.deviceId) cameras.value = state.source.deviceId;
+    });
+
+    const style = getComputedStyle(document.documentElement);
+    const colour = (name) => style.getPropertyValue(name).trim();
+
+    function drawFrame(state) {
+        const { frame } = state;
+        const fresh = frame && performance.now() - state.frameAt < STALE_MS;
+        if (!fresh || state.source.state !== "running") {
+            overlay.clear();
+            return;
+        }
+        const recognised = Boolean(state.gesture && state.gesture.phase !== "end");
+        const line = recognised ? colour("--overlay-match") : colour("--overlay-found");
+        overlay.draw(state.sender.width || 640, state.sender.height || 480, frame.roi, line, recognised);
+    }
+
+    let decoding = false;
+    let lastDetail = null;
+    async function drawDetail(detail) {
+        if (decoding || detail === lastDetail) return;
+        lastDetail = detail;
+        decoding = true;
+        const mask = detail.mask ? await bitmapFromBase64(detail.mask) : null;
+        overlay.setMask(mask, colour("--overlay-mask"));
+        const template = detail.template ? await bitmapFromBase64(detail.template) : null;
+        templateContext.clearRect(0, 0, 60, 80);
+        if (template) {
+            templateContext.drawImage(template, 0, 0, 60, 80);
+            template.close();
+        }
+        decoding = false;
+    }
+
+    store.watch(["frame", "gesture", "source"], drawFrame);
+    store.watch(["detail"], (state) => {
+        if (state.detail) drawDetail(state.detail);
+    });
+
+    function drawFacts() {
+        const state = store.state;
+        const running = state.source.state === "running";
+        const frame = running && performance.now() - state.frameAt < STALE_MS ? state.frame : null;
+        if (!frame) drawFrame(state);
+        const match = frame && frame.match;
+        setText(
+            panel.found,
+            match && match.gesture
+                ? `${match.gesture} · ${words.distance(short(match.distance, 2))}`
+                : frame ? words.nothing : "–",
+        );
+        const motion = frame && Number.isFinite(frame.motion) ? percent(frame.motion) : null;
+        const motionWords = frame && frame.still ? words.motionStill : words.motionMoving;
+        setText(panel.motion, motion && frame.motion !== null ? motionWords(motion) : "–");
+        setText(panel.rate, running ? words.rateValue(state.sender.rate) : "–");
+        const ms = state.sender.latencyMs;
+        setText(panel.answer, running && ms ? texts.connection.latency(number(ms, 0)) : "–");
+        const clip = state.source.kind === "synthetic" && running;
+        const shown = state.clipGesture;
+        caption.hidden = !clip || shown === undefined;
+        setText(caption, shown ? words.shows(shown) : words.showsNothing);
+        badge.hidden = !clip;
+    }
+    setInterval(drawFacts, 200);
+    store.watch(["source", "clipGesture"], drawFacts);
+    return video;
+}

@@ -1,0 +1,101 @@
+// The one sentence that says what is happening and why.
+
+import { texts } from "../texts/en.js";
+import { setText } from "./dom.js";
+import { isDriving, modeOf } from "./page.js";
+import { describeAction } from "./words.js";
+
+const words = texts.sentence;
+const STALE_FRAME_MS = 700;
+
+const bare = (text) => String(text || "").trim().replace(/[.\s]+$/, "");
+const asSentence = (text) => {
+    const clean = bare(text);
+    return clean ? `${clean[0].toUpperCase()}${clean.slice(1)}.` : "";
+};
+
+function seen(state) {
+    const gesture = state.gesture && state.gesture.phase !== "end" ? state.gesture.gesture : null;
+    return gesture || null;
+}
+
+function whileDriving(state, now) {
+    const { robot, frame } = state;
+    if (state.source.state === "starting") return words.sourceStarting;
+    if (state.source.state !== "running") return words.noSource;
+    const gesture = seen(state);
+    if (robot.mode === "moving" && robot.action) {
+        const what = describeAction(robot.action, state.description);
+        const limits = robot.limits && robot.limits.length ? robot.limits.join(", ") : "";
+        const tail = limits ? ` ${words.limits(limits)}` : "";
+        return (gesture ? words.movingHold(gesture, what) : words.moving(what)) + tail;
+    }
+    if (robot.limits && robot.limits.length) return words.limits(robot.limits.join(", "));
+    if (!frame) return words.waitingPicture;
+    if (now - state.frameAt > STALE_FRAME_MS) return words.noFrames;
+    if (gesture) return words.done(gesture);
+    return frame.reason ? asSentence(frame.reason) : words.ready;
+}
+
+/** What is happening and why, in one or two short sentences. */
+export function sentenceFor(state, now) {
+    const link = state.connection.state;
+    if (link === "signed-out") return words.signedOut;
+    if (link !== "open") return state.hello ? words.gone : words.connecting;
+    const { robot } = state;
+    if (!robot) return words.noRobot;
+    const mode = modeOf(state);
+    const why = bare(robot.reason);
+    if (mode === "faulted") return words.fault(bare(robot.fault) || words.faultUnknown);
+    if (mode === "unknown") return words.noRobot;
+    if (mode === "stopped") return `${words.stopped(why)} ${words.stoppedNext}`;
+    if (!isDriving(state)) {
+        if (robot.controller) return words.otherDrives(robot.controller);
+        if (state.source.state === "starting") return words.sourceStarting;
+        if (state.source.state !== "running") return words.noSource;
+        const gesture = seen(state);
+        return gesture ? words.seenIdle(gesture, words.noControl) : words.noControl;
+    }
+    if (!robot.armed) {
+        if (why && state.wasArmed) return words.disarmedWhy(why);
+        const gesture = seen(state);
+        return gesture ? words.seenIdle(gesture, words.disarmed) : words.disarmed;
+    }
+    if (mode === "holding") return `${words.holding(why)} ${words.holdingNext}`;
+    return whileDriving(state, now);
+}
+
+const SHOW_EVERY_MS = 250; // figures in a reason change with every frame; eyes do not
+const SPEAK_EVERY_MS = 2500;
+
+/** `spoken` is read by screen readers, more rarely, and without its figures changing all the time. */
+export function sentence(element, spoken, store) {
+    let shownAt = 0;
+    let spokenAt = 0;
+    let timer = 0;
+
+    function draw() {
+        const now = performance.now();
+        clearTimeout(timer);
+        timer = 0;
+        if (now - shownAt < SHOW_EVERY_MS) {
+            timer = setTimeout(draw, SHOW_EVERY_MS - (now - shownAt));
+            return;
+        }
+        const text = sentenceFor(store.state, now);
+        if (text !== element.textContent) shownAt = now;
+        setText(element, text);
+        const gist = text.replace(/[\d.,]+ ?%/g, "").replace(/\s+/g, " ");
+        if (now - spokenAt > SPEAK_EVERY_MS && spoken.dataset.gist !== gist) {
+            spokenAt = now;
+            spoken.dataset.gist = gist;
+            setText(spoken, text);
+        }
+    }
+
+    const keys = ["connection", "hello", "robot", "source", "gesture", "frame", "description"];
+    store.watch(keys, () => {
+        if (!timer) draw();
+    });
+    setInterval(draw, 500); // age changes without a message
+}

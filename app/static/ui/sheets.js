@@ -1,0 +1,112 @@
+// Sheets over the page: never modal, because the stop button below must stay in reach.
+
+import { texts } from "../texts/en.js";
+import { button, el } from "./dom.js";
+
+/** At most one sheet is open. */
+export class Sheets {
+    #host;
+    #open = null;
+
+    constructor(host) {
+        this.#host = host;
+    }
+
+    get isOpen() {
+        return this.#open !== null;
+    }
+
+    /** Name of the open sheet, or null. */
+    get name() {
+        return this.#open && this.#open.name;
+    }
+
+    /** Show `content` under a title. `onclose` is called however it is closed. */
+    show(name, title, content, { onclose = null, focus = null } = {}) {
+        this.close();
+        const heading = el("h2", { id: `${name}-title`, text: title, tabindex: "-1" });
+        const sheet = el(
+            "dialog",
+            { class: "sheet", id: `sheet-${name}`, "aria-labelledby": heading.id },
+            el(
+                "div",
+                { class: "sheet-head" },
+                heading,
+                button("", {
+                    class: "round small",
+                    iconName: "close",
+                    "aria-label": texts.actions.close,
+                    data: { part: "close" },
+                    onclick: () => this.close(),
+                }),
+            ),
+            el("div", { class: "sheet-body" }, ...[content].flat()),
+        );
+        const before = document.activeElement;
+        this.#host.append(sheet);
+        sheet.show();
+        this.#open = { name, sheet, before, onclose };
+        (focus || heading).focus();
+        return sheet;
+    }
+
+    /** Close what is open; says whether there was something. */
+    close() {
+        if (!this.#open) return false;
+        const { sheet, before, onclose } = this.#open;
+        this.#open = null;
+        sheet.remove();
+        if (onclose) onclose();
+        if (before && before.isConnected && before !== document.body) before.focus();
+        return true;
+    }
+}
+
+/** Contents of the help sheet. */
+export function helpContent() {
+    const { how, keysTitle, keys, keysNote, safetyTitle, safety } = texts.help;
+    return [
+        el("ol", { class: "how" }, ...how.map((text) => el("li", { text }))),
+        el("h3", { text: keysTitle }),
+        el(
+            "dl",
+            { class: "key-list" },
+            ...keys.map(([key, text]) =>
+                el("div", {}, el("dt", {}, el("kbd", { text: key })), el("dd", { text })),
+            ),
+        ),
+        el("p", { class: "quiet", text: keysNote }),
+        el("h3", { text: safetyTitle }),
+        el("p", { text: safety }),
+    ];
+}
+
+/** A question with one way on and one way back. */
+export function askContent(words, yesLabel, yes, no) {
+    return [
+        el("p", { text: words }),
+        el(
+            "div",
+            { class: "row end" },
+            button(texts.actions.cancel, { onclick: no, data: { part: "no" } }),
+            button(yesLabel, { class: "primary", onclick: yes, data: { part: "yes" } }),
+        ),
+    ];
+}
+
+/** What covers the cockpit while the server is gone; the dock stays free. */
+export function goneContent(kind, retry) {
+    const { gone } = texts;
+    const signedOut = kind === "signedOut";
+    return el(
+        "div",
+        { class: "gone-card" },
+        el("p", { class: "gone-title", text: signedOut ? gone.signedOutTitle : gone.title }),
+        el("p", { text: signedOut ? gone.signedOutWords : gone.words }),
+        button(signedOut ? gone.reload : gone.retry, {
+            class: "primary",
+            id: "gone-retry",
+            onclick: () => (signedOut ? location.reload() : retry()),
+        }),
+    );
+}

@@ -1,0 +1,231 @@
+// What the robot sees and how it stands: two cameras and the 3D view, one of them large.
+
+import { texts } from "../texts/en.js";
+import { button, el, setText } from "./dom.js";
+
+const OLD_MS = 500; // from here on the age of a picture is shown
+const CAMERAS = ["wrist", "scene"];
+
+/** One robot camera: draws pictures, shows their age. Opens nothing itself; it is given a feed. */
+class CameraView {
+    constructor(name, feed, enlarge) {
+        this.name = name;
+        this.feed = feed;
+        this.arrivedAt = 0;
+        this.open = false;
+        this.visible = false;
+        const label = texts.stage.views[name];
+        this.canvas = el("canvas", { role: "img", "aria-label": label, width: 320, height: 240 });
+        this.age = el("span", { class: "age", data: { part: "age" } });
+        this.empty = el("p", { class: "view-empty", text: texts.stage.noPicture });
+        const title = el("p", { class: "view-title" }, el("span", { text: label }), this.age);
+        const cover = el("button", {
+            type: "button",
+            class: "view-cover",
+            "aria-label": texts.stage.enlarge(label),
+            onclick: () => enlarge(name),
+        });
+        this.element = el(
+            "div",
+            { class: "view is-empty", data: { view: name } },
+            this.canvas,
+            this.empty,
+            title,
+            cover,
+        );
+        this.context = this.canvas.getContext("2d");
+        feed.addEventListener("picture", (event) => this.#draw(event.detail.bitmap));
+    }
+
+    want(visible) {
+        if (visible === this.open) return;
+        this.open = visible;
+        if (visible) this.feed.open();
+        else this.feed.close();
+    }
+
+    tick(now) {
+        const late = this.arrivedAt ? now - this.arrivedAt : 0;
+        const old = this.open && late > OLD_MS;
+        this.element.classList.toggle("is-old", old);
+        setText(this.age, old ? texts.stage.age((late / 1000).toFixed(1)) : "");
+        if (!this.arrivedAt && this.open) {
+            const dead = this.feed.failures > 1;
+            setText(this.empty, dead ? texts.stage.noCamera : texts.stage.noPicture);
+        }
+    }
+
+    #draw(bitmap) {
+        if (this.canvas.width !== bitmap.width || this.canvas.height !== bitmap.height) {
+            this.canvas.width = bitmap.width;
+            this.canvas.height = bitmap.height;
+        }
+        this.context.drawImage(bitmap, 0, 0);
+        bitmap.close();
+        this.arrivedAt = performance.now();
+        this.element.classList.remove("is-empty");
+    }
+}
+
+function canDraw3d() {
+    try {
+        const canvas = document.createElement("canvas");
+        return Boolean(canvas.getContext("webgl2") || canvas.getContext("webgl"));
+    } catch {
+        return false;
+    }
+}
+
+/** The 3D view in its frame: loaded when first seen, and again when the server came back. */
+class View3d {
+    constructor(enlarge, onFrame, hidden, onHide) {
+        this.onFrame = onFrame;
+        this.visible = false;
+        this.possible = null;
+        this.frame = null;
+        const label = texts.stage.views["3d"];
+        this.note = el("p", { class: "view-empty" });
+        this.big = button("", {
+            class: "round small",
+            "aria-label": texts.stage.enlarge(label),
+            iconName: "enlarge",
+            onclick: () => enlarge("3d"),
+        });
+        this.hide = button("", {
+            id: "hide-3d",
+            class: "round small",
+            "aria-label": texts.stage.hide,
+            iconName: "close",
+            onclick: () => this.setHidden(true),
+        });
+        this.show = button(texts.stage.show, {
+            id: "show-3d",
+            onclick: () => this.setHidden(false),
+        });
+        this.element = el(
+            "div",
+            { class: "view view-3d is-empty", id: "view-3d", data: { view: "3d" } },
+            this.note,
+            this.show,
+            el("p", { class: "view-title" }, el("span", { text: label })),
+            el("div", { class: "view-tools" }, this.big, this.hide),
+        );
+        this.onHide = onHide;
+        this.setHidden(hidden);
+    }
+
+    setHidden(hidden) {
+        this.hidden = hidden;
+        this.element.classList.toggle("is-hidden", hidden);
+        this.show.hidden = !hidden;
+        this.hide.hidden = hidden;
+        this.big.hidden = hidden;
+        if (hidden) this.#unload();
+        else this.load();
+        this.onHide(hidden);
+    }
+
+    /** Load the frame if it is wanted, seen, and can be drawn. */
+    load() {
+        if (this.hidden || !this.visible || this.frame) return;
+        if (this.possible === null) this.possible = canDraw3d();
+        if (!this.possible) {
+            setText(this.note, texts.stage.no3d);
+            return;
+        }
+        setText(this.note, texts.stage.loading3d);
+        this.frame = el("iframe", {
+            title: texts.stage.views["3d"],
+            src: "viser/",
+            onload: () => this.#loaded(),
+        });
+        this.element.prepend(this.frame);
+    }
+
+    reload() {
+        this.#unload();
+        this.load();
+    }
+
+    #loaded() {
+        try {
+            const inner = this.frame.contentWindow;
+            const kind = inner.document.contentType;
+            if (kind !== "text/html") throw new Error("not a page");
+            this.element.classList.remove("is-empty");
+            this.onFrame(inner);
+        } catch {
+            this.#unload();
+            setText(this.note, texts.stage.failed3d);
+        }
+    }
+
+    #unload() {
+        if (this.frame) this.frame.remove();
+        this.frame = null;
+        this.element.classList.add("is-empty");
+        setText(this.note, "");
+    }
+}
+
+/**
+ * Fills `element`. `feeds` maps camera names to feeds; `onFrame(window)` is called with the 3D
+ * frame's window, so that keys work in there; `memory` keeps small choices.
+ */
+export function stage(element, store, { feeds, onFrame, memory }) {
+    const enlarge = (name) => {
+        element.dataset.large = name;
+        memory.set("large", name);
+    };
+    const cameras = CAMERAS.map((name) => new CameraView(name, feeds[name], enlarge));
+    const hidden = memory.get("hide-3d") === "yes";
+    const view3d = new View3d(enlarge, onFrame, hidden, (now) => {
+        memory.set("hide-3d", now ? "yes" : "no");
+        if (now && element.dataset.large === "3d") enlarge("wrist");
+    });
+    const views = [...cameras, view3d];
+    element.append(...views.map((view) => view.element));
+    const last = memory.get("large");
+    const known = views.some((view) => view.element.dataset.view === last);
+    if (known && !(last === "3d" && hidden)) element.dataset.large = last;
+
+    const update = () => {
+        const awake = document.visibilityState !== "hidden";
+        const signedIn = store.state.connection.state !== "signed-out";
+        for (const camera of cameras) camera.want(awake && signedIn && camera.visible);
+        if (awake) view3d.load();
+    };
+    const seen = new IntersectionObserver(
+        (entries) => {
+            for (const entry of entries) {
+                const view = views.find((candidate) => candidate.element === entry.target);
+                view.visible = entry.isIntersecting;
+            }
+            update();
+        },
+        { rootMargin: "80px" },
+    );
+    for (const view of views) seen.observe(view.element);
+    document.addEventListener("visibilitychange", update);
+    setInterval(() => {
+        const now = performance.now();
+        for (const camera of cameras) camera.tick(now);
+    }, 200);
+
+    let was = null;
+    let session = null;
+    store.watch(["connection", "hello"], (state) => {
+        const name = state.connection.state;
+        if (name !== was) update();
+        was = name;
+        // Another session means the server, and the 3D view with it, may have started anew.
+        const now = state.hello && state.hello.session;
+        if (session && now && now !== session && view3d.frame) view3d.reload();
+        session = now || session;
+    });
+
+    return {
+        /** Make the other camera large. */
+        swap: () => enlarge(element.dataset.large === "wrist" ? "scene" : "wrist"),
+    };
+}

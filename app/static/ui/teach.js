@@ -1,0 +1,164 @@
+// The sheet that enrols a gesture, and changes or deletes one.
+
+import { texts } from "../texts/en.js";
+import { ActionForm } from "./action-form.js";
+import { Capture } from "./capture.js";
+import { button, el, setText } from "./dom.js";
+import { describeError } from "./words.js";
+
+const words = texts.teach;
+const MOST_THUMBS = 12;
+
+/**
+ * Contents for the sheet. `gesture` is null to enrol a new one. `act` does the work and throws
+ * ApiError: {create, update, addSamples, remove}. `done(text)` closes the sheet.
+ */
+export function teachContent({ gesture, store, video, grab, act, recognise, templateUrl, done }) {
+    const name = el("input", {
+        id: "teach-name",
+        name: "name",
+        type: "text",
+        maxlength: "60",
+        autocomplete: "off",
+        spellcheck: "false",
+        required: true,
+        value: gesture ? gesture.name : "",
+        "aria-describedby": "teach-name-hint",
+    });
+    const form = new ActionForm(gesture && gesture.action, {
+        description: store.state.description,
+    });
+    const capture = new Capture({
+        video,
+        store,
+        grab,
+        recognise,
+        ownName: () => (gesture ? gesture.name : null),
+    });
+    const problem = el("p", { class: "problem-line", role: "alert", id: "teach-problem" });
+    const save = button(gesture ? words.saveChanges : words.save, {
+        id: "teach-save",
+        class: "primary",
+        onclick: () => run(submit),
+    });
+    const buttons = [save];
+    let busy = false;
+
+    async function run(work) {
+        if (busy) return;
+        busy = true;
+        for (const each of buttons) each.disabled = true;
+        setText(problem, words.saving);
+        problem.classList.add("is-waiting");
+        try {
+            await work();
+        } catch (error) {
+            if (typeof error.status !== "number") throw error; // a mistake of the page
+            problem.classList.remove("is-waiting");
+            setText(problem, describeError(error));
+            if (error.status === 409) name.focus();
+        } finally {
+            busy = false;
+            for (const each of buttons) each.disabled = false;
+        }
+    }
+
+    function refuse(text, field) {
+        problem.classList.remove("is-waiting");
+        setText(problem, text);
+        if (field) field.focus();
+    }
+
+    async function submit() {
+        const wanted = name.value.trim();
+        if (!wanted) return refuse(words.nameMissing, name);
+        if (!form.check()) return refuse("", null);
+        const action = form.value();
+        if (!gesture) {
+            if (!capture.stills.length) return refuse(words.stillsMissing, capture.one);
+            await act.create(wanted, action, capture.stills);
+            return done(words.saved(wanted));
+        }
+        const changes = {};
+        if (wanted !== gesture.name) changes.name = wanted;
+        if (JSON.stringify(action) !== JSON.stringify(gesture.action)) changes.action = action;
+        if (Object.keys(changes).length) await act.update(gesture.id, changes);
+        if (capture.stills.length) {
+            await act.addSamples(gesture.id, capture.stills);
+            capture.clear();
+        }
+        return done(words.saved(wanted));
+    }
+
+    const row = el("div", { class: "row end" }, save);
+    const content = [
+        el(
+            "div",
+            { class: "field" },
+            el("label", { for: "teach-name", text: words.name }),
+            name,
+            el("p", { class: "quiet", id: "teach-name-hint", text: words.nameHint }),
+        ),
+        el("fieldset", {}, el("legend", { text: words.action }), form.element),
+        el(
+            "fieldset",
+            {},
+            el("legend", { text: gesture ? words.morePictures : words.pictures }),
+            gesture ? enrolled(gesture) : el("p", { class: "quiet", text: words.picturesHint }),
+            capture.element,
+        ),
+        problem,
+        row,
+    ];
+    if (gesture) row.prepend(deletion());
+
+    function enrolled({ id, samples, updated }) {
+        const count = Number.isFinite(samples) ? samples : 1;
+        const shown = Math.min(count, MOST_THUMBS);
+        return el(
+            "div",
+            { class: "enrolled" },
+            el("p", { class: "quiet", text: words.enrolled(count) }),
+            el(
+                "div",
+                { class: "thumbs" },
+                ...Array.from({ length: shown }, (_, index) =>
+                    el("img", {
+                        class: "thumb",
+                        alt: "",
+                        width: 30,
+                        height: 40,
+                        src: templateUrl(id, String(updated), index),
+                    }),
+                ),
+            ),
+        );
+    }
+
+    function deletion() {
+        const box = el("div", { class: "deletion" });
+        const ask = button(words.delete, {
+            id: "teach-delete",
+            class: "danger-quiet",
+            onclick: () => {
+                box.replaceChildren(el("p", { text: words.deleteAsk(gesture.name) }), yes, no);
+                no.focus();
+            },
+        });
+        const no = button(words.deleteNo, { onclick: () => box.replaceChildren(ask) });
+        const yes = button(words.deleteYes, {
+            id: "teach-delete-yes",
+            class: "danger",
+            onclick: () =>
+                run(async () => {
+                    await act.remove(gesture.id);
+                    done(words.deleted(gesture.name));
+                }),
+        });
+        buttons.push(ask, yes, no);
+        box.append(ask);
+        return box;
+    }
+
+    return { content, focus: name, close: () => capture.close() };
+}

@@ -1,0 +1,89 @@
+// Numbers and actions as people say them.
+
+import { texts } from "../texts/en.js";
+
+const words = texts.action;
+const AXES = ["x", "y", "z"];
+const DEGREES = 180 / Math.PI;
+
+/** A number with a real minus sign and without needless zeros. */
+export function number(value, digits = 1) {
+    if (!Number.isFinite(value)) return "–";
+    const text = value.toFixed(digits);
+    const zero = Number(text) === 0;
+    return (zero ? text.replace("-", "") : text).replace("-", "−");
+}
+
+/** Like number(), but "10" and not "10.0". */
+export function short(value, digits = 1) {
+    return number(value, digits).replace(/\.0+$/, "");
+}
+
+export const degrees = (radians) => radians * DEGREES;
+export const radians = (value) => value / DEGREES;
+
+/** "12.3°" */
+export const angle = (value) => `${number(degrees(value))}°`;
+
+/** "4.2%" */
+export const percent = (fraction) => `${number(fraction * 100)}%`;
+
+function cartesian(action) {
+    const frame = action.frame === "tool" ? "tool" : "base";
+    const parts = [];
+    (action.linear || []).forEach((speed, axis) => {
+        if (!speed) return;
+        const direction = words.straight[frame][AXES[axis] + (speed > 0 ? "+" : "-")];
+        parts.push(words.linear(direction, short(Math.abs(speed) * 100)));
+    });
+    (action.angular || []).forEach((speed, axis) => {
+        if (!speed) return;
+        const name = frame === "tool" ? `tool ${AXES[axis]}` : AXES[axis];
+        parts.push(words.angular(name, short(degrees(speed))));
+    });
+    return parts.length ? parts.join(", ") : words.stand;
+}
+
+const WIDEST_GRIPPER = 0.08;
+
+function simple(action, description) {
+    switch (action && action.type) {
+        case "jog_cartesian":
+            return cartesian(action);
+        case "jog_joint":
+            return words.jogJoint(action.joint, short(degrees(action.velocity)));
+        case "turn_joint":
+            return words.turnJoint(action.joint, short(degrees(action.angle)));
+        case "pose":
+            return words.pose(action.name);
+        case "gripper": {
+            const widest = (description && description.gripper_max) || WIDEST_GRIPPER;
+            if (action.width <= 0.001) return words.closed;
+            if (action.width >= widest * 0.95) return words.open;
+            return words.gripper(short(action.width * 1000));
+        }
+        case "home":
+            return words.home;
+        case "stop":
+            return words.stop;
+        default:
+            return words.unknown;
+    }
+}
+
+/** What an action does, in plain words: "forward 10 cm/s". */
+export function describeAction(action, description = null) {
+    if (action && action.type === "sequence" && Array.isArray(action.steps)) {
+        const steps = action.steps.map((step) => describeAction(step, description));
+        return steps.length ? words.sequence(steps[0], steps.length - 1) : words.unknown;
+    }
+    const what = simple(action, description);
+    return action && action.duration ? words.lasting(what, short(action.duration)) : what;
+}
+
+/** An error of the REST interface as one sentence. */
+export function describeError(error) {
+    if (error.status === 0) return texts.errors.unreachable;
+    if (error.message) return texts.errors.server(error.message);
+    return texts.errors[error.code] || texts.errors.other(error.status);
+}
