@@ -1,0 +1,133 @@
+"""From what the hand shows to what the robot is asked: one decision a processed frame."""
+
+from dataclasses import dataclass
+
+from app.gateway.numbers import Counter
+from app.link.actions import Action, Stop
+from app.link.messages import Command, State, StopRequest
+
+
+@dataclass(frozen=True)
+class Lease:
+    """The right to drive, as the node granted it."""
+
+    epoch: int
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What the decision rests on, all as of the moment the frame arrived."""
+
+    actions: dict[str, Action]
+    lease: Lease | None
+    state: State | None
+    """Newest state of the robot; None when it is not connected."""
+    stale: str | None = None
+    """Why the frame is too old to move anything, in plain words."""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What to send to the robot, and why nothing moves if a gesture was shown."""
+
+    command: Command | None = None
+    stop: StopRequest | None = None
+    reason: str | None = None
+
+
+class Driver:
+    """Turns one session's recognised gestures into commands.
+
+    Every showing of a gesture has a number (``hold``). One that began before the robot was armed
+    for this session, or during which it was not, moves nothing any more: neither arming nor the
+    end of a fault starts a motion by itself.
+
+    Args:
+        session: Name of the session, for the log of stops.
+        holds: Numbers of showings; shared by all sessions, so that none comes twice.
+    """
+
+    def __init__(self, session: str, holds: Counter) -> None:
+        self._session = session
+        self._holds = holds
+        self._sequence = 0
+        self._gesture: str | None = None
+        self._hold = 0
+        self._may_move = False
+
+    def end(self) -> None:
+        """The gesture is over: frames stopped coming."""
+        self._gesture = None
+
+    def decide(self, gesture: str | None, frame: int, situation: Situation) -> Decision:
+        """Decide on one processed frame.
+
+        Args:
+            gesture: Name of the gesture that is held, after N-of-M agreement.
+            frame: The frame's sequence number.
+            situation: As of the frame's arrival.
+        """
+        begins = gesture is not None and gesture != self._gesture
+        self._gesture = gesture
+        reason = self._obstacle(situation)
+        if begins:
+            self._hold = self._holds.next()
+            self._may_move = reason is None
+        elif reason is not None and not situation.stale:
+            self._may_move = False
+        action = None if gesture is None else situation.actions.get(gesture)
+        stop = None
+        if gesture is not None and isinstance(action, Stop):
+            # Anybody's stop counts, with or without control, and however late it comes.
+            if begins:
+                stop = StopRequest(
+                    source=self._session, reason=f"the gesture {gesture!r} was shown"
+                )
+            reason = None
+            action = None
+        elif gesture is not None and action is None:
+            reason = f"the gesture {gesture!r} is no longer enrolled"
+        elif gesture is not None and reason is None and not self._may_move:
+            reason = "this gesture began before the robot was ready: let go and show it again"
+        if gesture is None or reason is not None:
+            action = None
+        if situation.stale or situation.lease is None or situation.state is None:
+            return Decision(stop=stop, reason=reason if gesture else situation.stale)
+        self._sequence += 1
+        command = Command(
+            epoch=situation.lease.epoch,
+            sequence=self._sequence,
+            tick=situation.state.tick,
+            frame=frame,
+            hold=self._hold,
+            gesture=gesture,
+            action=action,
+            reason=reason if gesture else None,
+        )
+        return Decision(command=command, stop=stop, reason=reason if gesture else None)
+
+    def _obstacle(self, situation: Situation) -> str | None:
+        """Why no gesture could move the robot now, if so."""
+        state = situation.state
+        if situation.stale:
+            return situation.stale
+        if state is None:
+            return "the robot is not connected"
+        if situation.lease is None:
+            if state.controller is None:
+                return "nobody has control: take control first"
+            return f"you do not have control: {state.controller} drives"
+        match state.mode:
+            case "faulted":
+                return f"the robot has a fault: {state.fault or 'see its log'}"
+            case "stopped":
+                return "the robot is stopped: reset it, then arm it"
+            case "disarmed":
+                return "the robot is not armed"
+            case "holding":
+                because = f" ({state.reason})" if state.reason else ""
+                return (
+                    f"the robot holds still{because}: show no gesture for half a second, "
+                    "then a new one"
+                )
+        return None if state.armed else "the robot is not armed"

@@ -1,0 +1,110 @@
+"""The gesture database as the sessions need it: a fitted matcher, and the action of each name."""
+
+import logging
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from app.config import PipelineSettings, Settings
+from app.errors import CannotStart
+from app.gestures import GestureStore
+from app.link.actions import Action
+from app.pipeline import Gallery, PcaMatcher, unpack_template
+
+log = logging.getLogger(__name__)
+
+DATABASE_FILE = "gestures.db"
+
+
+def starter_set() -> Path | None:
+    """The folder of the starter set: inside the wheel, or beside the package in a checkout."""
+    package = Path(__file__).parents[1]
+    for folder in (package / "gesture_db", package.parent / "gesture_db"):
+        if (folder / "gestures.toml").is_file():
+            return folder
+    return None
+
+
+def open_store(settings: Settings) -> GestureStore:
+    """Open the database of ``settings``; a new one is filled with the starter set.
+
+    Raises:
+        DatabaseBroken: it is there, but cannot be read.
+        CannotStart: the folder cannot be made or written.
+    """
+    url = settings.database_url
+    if url is None:
+        try:
+            settings.data_dir.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise CannotStart(
+                f"the data folder {settings.data_dir} cannot be made ({error.strerror}); "
+                "choose another with --data-dir",
+                path=str(settings.data_dir),
+            ) from error
+        url = f"sqlite:///{settings.data_dir.absolute() / DATABASE_FILE}"
+    return GestureStore(url, starter_set())
+
+
+def fit(templates: Sequence[tuple[str, bytes]], settings: PipelineSettings) -> PcaMatcher:
+    """A matcher for (name, 600 bytes) pairs."""
+    images = [unpack_template(template) for _, template in templates]
+    stacked = np.stack(images) if images else np.zeros((0, 80, 60), np.uint8)
+    gallery = Gallery(labels=tuple(name for name, _ in templates), templates=stacked)
+    return PcaMatcher.fit(gallery, settings.match)
+
+
+def build_matcher(store: GestureStore, settings: PipelineSettings) -> PcaMatcher:
+    """A matcher for everything that is enrolled now."""
+    return fit(store.templates(), settings)
+
+
+@dataclass(frozen=True)
+class Enrolled:
+    """What was enrolled at one moment. Immutable, so that sessions may share it."""
+
+    version: int
+    matcher: PcaMatcher
+    actions: dict[str, Action] = field(default_factory=dict)
+    """By the gesture's name."""
+
+
+class LiveGallery:
+    """Keeps :class:`Enrolled` up to date with the database. Safe to use from any thread."""
+
+    def __init__(self, store: GestureStore, settings: PipelineSettings) -> None:
+        self._store = store
+        self._settings = settings
+        self._lock = threading.Lock()
+        self._current = self._read()
+
+    @property
+    def current(self) -> Enrolled:
+        """What is enrolled, as of the last :meth:`refresh`."""
+        return self._current
+
+    def refresh(self) -> bool:
+        """Read the database again if it changed, whichever process changed it.
+
+        Returns:
+            Whether it had changed. Takes as long as fitting the matcher; not for the event loop.
+        """
+        with self._lock:
+            if self._store.version == self._current.version:
+                return False
+            self._current = self._read()
+            log.info("%d gestures are enrolled", len(self._current.actions))
+            return True
+
+    def _read(self) -> Enrolled:
+        # The version first: a change in between is then seen by the next refresh.
+        version = self._store.version
+        gestures = self._store.list()
+        pairs = [
+            (gesture.name, sample.template) for gesture in gestures for sample in gesture.samples
+        ]
+        actions = {gesture.name: gesture.action for gesture in gestures}
+        return Enrolled(version, fit(pairs, self._settings), actions)

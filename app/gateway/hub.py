@@ -1,0 +1,175 @@
+"""Everything that lives as long as the server: opened in order, closed in the opposite one."""
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator, Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AsyncExitStack, asynccontextmanager
+from importlib.metadata import PackageNotFoundError, version
+
+from app.config import Settings
+from app.gateway.gallery import LiveGallery, open_store
+from app.gateway.lease_keeper import check_reply
+from app.gateway.metrics import Metrics
+from app.gateway.numbers import Counter
+from app.gateway.operator_ws import tell_robot, watch_gallery
+from app.gateway.relay import Relay
+from app.gateway.robot_port import RobotPort
+from app.gateway.session import OperatorSession
+from app.gateway.viser_scene import ViserScene
+from app.gestures import GestureStore
+from app.link.messages import LeaseReply, LeaseRequest, StopRequest
+
+log = logging.getLogger(__name__)
+
+LINK_THREADS = 4
+STOP_THREADS = 4
+"""A stop never waits for a thread that a silent robot keeps busy."""
+
+
+def package_version() -> str:
+    """Version of the installed package."""
+    try:
+        return version("farhand")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+class Hub:
+    """What the routes and sessions share. Used on the event loop."""
+
+    def __init__(
+        self,
+        settings: Settings,
+        store: GestureStore,
+        gallery: LiveGallery,
+        robot: RobotPort,
+        images: ThreadPoolExecutor,
+        viser: ViserScene | None,
+    ) -> None:
+        self.settings = settings
+        self.store = store
+        self.gallery = gallery
+        self.robot = robot
+        self.images = images
+        self.viser = viser
+        self.version = package_version()
+        self.metrics = Metrics()
+        self.metrics.add_live(self._live_values)
+        self.holds = Counter()
+        self.sessions: set[OperatorSession] = set()
+        self.relay = Relay(robot, lambda name: self.metrics.pictures.labels(name).inc())
+        self.closing = asyncio.Event()
+        self._link_threads = ThreadPoolExecutor(LINK_THREADS, "link")
+        self._stop_threads = ThreadPoolExecutor(STOP_THREADS, "stop")
+        self._told_version = gallery.current.version
+
+    @classmethod
+    @asynccontextmanager
+    async def open(
+        cls, settings: Settings, is_ending: Callable[[], bool] = lambda: False
+    ) -> AsyncIterator["Hub"]:
+        """Open everything, and close everything again.
+
+        Args:
+            settings: Of the whole server.
+            is_ending: Whether to give up waiting for the robot.
+
+        Raises:
+            DatabaseBroken, CannotStart, LinkFailed: what is needed is not there.
+        """
+        async with AsyncExitStack() as stack:
+            store = await asyncio.to_thread(open_store, settings)
+            stack.callback(store.close)
+            gallery = await asyncio.to_thread(LiveGallery, store, settings.pipeline)
+            robot = RobotPort(settings)
+            stack.push_async_callback(asyncio.to_thread, robot.close)
+            robot.start()
+            images = ThreadPoolExecutor(settings.gateway.workers, "image")
+            stack.callback(images.shutdown, wait=False, cancel_futures=True)
+            viser: ViserScene | None = None
+            if settings.gateway.viser:
+                viser = await asyncio.to_thread(ViserScene, robot)
+                stack.push_async_callback(asyncio.to_thread, viser.close)
+            hub = cls(settings, store, gallery, robot, images, viser)
+            stack.push_async_callback(hub._close)
+            deadline = asyncio.get_running_loop().time() + settings.gateway.ready_wait_s
+            while (
+                not (robot.online and robot.description is not None)
+                and asyncio.get_running_loop().time() < deadline
+                and not is_ending()
+            ):
+                await asyncio.sleep(0.02)
+            tasks = [asyncio.create_task(tell_robot(hub)), asyncio.create_task(watch_gallery(hub))]
+            try:
+                yield hub
+            finally:
+                hub.closing.set()
+                for task in tasks:
+                    task.cancel()
+                await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _close(self) -> None:
+        await self.relay.close()
+        for pool in (self._link_threads, self._stop_threads):
+            pool.shutdown(wait=False, cancel_futures=True)
+
+    async def ask(self, request: LeaseRequest) -> LeaseReply:
+        """Ask the robot's control loop.
+
+        Raises:
+            RobotUnavailable: no answer came in time.
+        """
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(self._link_threads, self.robot.ask, request)
+
+    async def stop(self, source: str, reason: str) -> None:
+        """Stop the robot (category S1) and wait until it confirms.
+
+        Raises:
+            RobotUnavailable: it was not confirmed in time.
+        """
+        request = StopRequest(source=source[:80], reason=reason[:300])
+        timeout_s = self.settings.gateway.stop_confirm_ms / 1000
+        loop = asyncio.get_running_loop()
+        await loop.run_in_executor(self._stop_threads, self.robot.stop, request, timeout_s)
+
+    async def reset(self, source: str) -> None:
+        """Leave the latched stop; moves nothing.
+
+        Raises:
+            LeaseRefused: the robot says why not.
+            RobotUnavailable: no answer came in time.
+        """
+        check_reply(await self.ask(LeaseRequest(kind="reset", holder=source[:80])))
+
+    async def gallery_changed(self) -> None:
+        """Read the gestures again if they changed, and tell every session."""
+        await asyncio.to_thread(self.gallery.refresh)
+        current = self.gallery.current.version
+        if current != self._told_version:
+            self._told_version = current
+            for session in tuple(self.sessions):
+                session.outbox.put({"type": "gallery", "version": current})
+
+    def _live_values(self) -> Iterable[tuple[str, str, float | None]]:
+        robot = self.robot
+        state = robot.state
+        yield "farhand_robot_online", "1 while the robot speaks", float(robot.online)
+        yield "farhand_robot_state_age_seconds", "Age of the newest state", robot.age_s
+        yield "farhand_robot_restarts", "Starts of the node after its first", float(robot.restarts)
+        yield "farhand_camera_viewers", "Who looks at camera pictures", float(self.relay.viewers)
+        yield "farhand_sessions", "Operator sessions open", float(len(self.sessions))
+        yield (
+            "farhand_gestures",
+            "Gestures enrolled",
+            float(len(self.gallery.current.actions)),
+        )
+        if state is not None:
+            yield "farhand_node_stops", "Stops the node received", float(state.stops)
+            dropped = float(sum(state.dropped.values()))
+            yield "farhand_node_commands_dropped", "Commands the node refused", dropped
+            if state.loop is not None:
+                yield "farhand_node_loop_hertz", "Rate of the control loop", state.loop.rate_hz
+                late = state.loop.late_max_ms / 1000
+                yield "farhand_node_loop_late_seconds", "Worst lateness, last second", late

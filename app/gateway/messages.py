@@ -1,0 +1,125 @@
+"""The operator WebSocket's text messages, both ways. docs/protocol.md describes every field.
+
+``frame`` and ``robot`` messages are replaced by newer ones while they wait to be sent
+(:data:`NEWEST_WINS`); the others are kept.
+"""
+
+import json
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+
+from app.errors import FarhandError, MessageRefused
+from app.gateway.errors import describe_validation
+
+MAX_TEXT = 4096
+"""Characters of a client's text message."""
+
+CLIENT_MESSAGES = (
+    "take_control",
+    "release_control",
+    "arm",
+    "disarm",
+    "stop",
+    "reset",
+    "view",
+    "ping",
+)
+SERVER_MESSAGES = ("hello", "frame", "gesture", "robot", "gallery", "pong", "error")
+NEWEST_WINS = frozenset({"frame", "robot", "gallery", "pong"})
+
+
+class _ClientMessage(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class TakeControl(_ClientMessage):
+    """Become the one who drives; with ``takeover`` also when somebody else does."""
+
+    type: Literal["take_control"]
+    takeover: bool = False
+
+
+class Plain(_ClientMessage):
+    """A request without values."""
+
+    type: Literal["release_control", "arm", "disarm", "stop", "reset"]
+
+
+class View(_ClientMessage):
+    """Ask for masks and templates in the ``frame`` messages, or for none."""
+
+    type: Literal["view"]
+    detail: bool
+
+
+class Ping(_ClientMessage):
+    """Answered with ``pong``."""
+
+    type: Literal["ping"]
+    t: float
+
+
+ClientMessage = Annotated[TakeControl | Plain | View | Ping, Field(discriminator="type")]
+_CLIENT_MESSAGE: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)
+
+
+def _no_constant(name: str) -> float:
+    raise ValueError(f"{name} is not a JSON number")
+
+
+def parse_client_message(text: str) -> ClientMessage:
+    """Read one text message.
+
+    Raises:
+        MessageRefused: too long, not JSON (NaN and infinity are not), not an object, of unknown
+            type, or with values that are not allowed.
+    """
+    if len(text) > MAX_TEXT:
+        raise MessageRefused(
+            f"the text message has {len(text)} characters; at most {MAX_TEXT} are allowed",
+            code="message_too_long",
+            length=len(text),
+        )
+    try:
+        value = json.loads(text, parse_constant=_no_constant)
+    except (ValueError, RecursionError) as error:
+        raise MessageRefused(
+            f"the text message is not JSON: {error}"[:300], code="message_not_json"
+        ) from None
+    if not isinstance(value, dict):
+        raise MessageRefused(
+            "the text message is not a JSON object with a type", code="message_not_object"
+        )
+    kind = value.get("type")
+    if kind not in CLIENT_MESSAGES:
+        raise MessageRefused(
+            f"the message type {str(kind)[:40]!r} is not known; "
+            f"known are {', '.join(CLIENT_MESSAGES)}",
+            code="message_type",
+        )
+    try:
+        return _CLIENT_MESSAGE.validate_python(value)
+    except ValidationError as error:
+        message, _ = describe_validation(error)
+        raise MessageRefused(message[:300], code="message_values", type=kind) from None
+
+
+def encode(message: dict[str, Any]) -> str:
+    """One message as JSON text.
+
+    Raises:
+        ValueError: a number is not finite.
+    """
+    return json.dumps(message, allow_nan=False, separators=(",", ":"))
+
+
+def error_message(error: FarhandError, seq: int | None = None) -> dict[str, Any]:
+    """The ``error`` message that an error becomes."""
+    return {
+        "type": "error",
+        "code": error.code,
+        "message": error.message,
+        "detail": error.detail,
+        "seq": seq,
+    }

@@ -1,0 +1,117 @@
+"""REST: health, metrics, the synthetic operator, and the description of all of it."""
+
+import asyncio
+import logging
+import os
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fastapi import APIRouter, Request
+from starlette.responses import FileResponse, HTMLResponse, JSONResponse, Response
+
+from app.errors import FarhandError
+from app.gateway.pages import routes_page
+
+if TYPE_CHECKING:
+    from app.gateway.auth import Gatekeeper
+    from app.gateway.hub import Hub
+
+log = logging.getLogger(__name__)
+
+router = APIRouter()
+
+CLIP_FILE = "operator.webm"
+_clip_lock = asyncio.Lock()
+
+
+@router.get("/api/health", tags=["server"], summary="Is the server alive?")
+async def health(request: Request) -> dict[str, Any]:
+    """``{"status": "ok"}`` for everybody; the details for who is signed in."""
+    gatekeeper: Gatekeeper = request.app.state.gatekeeper
+    answer: dict[str, Any] = {"status": "ok"}
+    if gatekeeper.credential(request.headers) is None:
+        return answer
+    hub: Hub = request.app.state.hub
+    try:
+        database = "ok"
+        await asyncio.to_thread(lambda: hub.store.version)
+    except FarhandError as error:
+        database = error.message
+    robot = hub.robot
+    return answer | {
+        "version": hub.version,
+        "database": database,
+        "gestures": len(hub.gallery.current.actions),
+        "sessions": len(hub.sessions),
+        "camera_viewers": hub.relay.viewers,
+        "viser": hub.viser is not None,
+        "robots": [
+            {
+                "id": robot.id,
+                "online": robot.online,
+                "fault": robot.fault,
+                "age_ms": None if robot.age_s is None else round(robot.age_s * 1000),
+                "restarts": robot.restarts,
+                "pid": robot.node_pid,
+            }
+        ],
+    }
+
+
+@router.get(
+    "/metrics",
+    tags=["server"],
+    summary="Counters for Prometheus",
+    response_class=Response,
+    responses={200: {"content": {"text/plain": {}}}},
+)
+async def metrics(request: Request) -> Response:
+    """Prometheus' text format."""
+    hub: Hub = request.app.state.hub
+    return Response(hub.metrics.text(), media_type="text/plain; version=0.0.4; charset=utf-8")
+
+
+@router.get(
+    "/api/synthetic/operator.webm",
+    tags=["server"],
+    summary="A drawn operator, as video",
+    response_class=FileResponse,
+    responses={200: {"content": {"video/webm": {}}}},
+)
+async def operator_clip(request: Request) -> FileResponse:
+    """A drawn hand that shows the starter gestures; made once and kept in the data folder."""
+    hub: Hub = request.app.state.hub
+    path = hub.settings.data_dir / f"{hub.version}-{CLIP_FILE}"
+    async with _clip_lock:
+        if not path.is_file():
+            await asyncio.to_thread(_make_clip, path)
+    return FileResponse(
+        path, media_type="video/webm", headers={"Cache-Control": "private, max-age=3600"}
+    )
+
+
+def _make_clip(path: Path) -> None:
+    """Write the clip beside ``path`` and move it there whole."""
+    from app.gestures.synthetic import operator_clip
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, draft = tempfile.mkstemp(dir=path.parent, prefix=".clip-", suffix=".webm")
+    os.close(handle)
+    try:
+        operator_clip(Path(draft))
+        Path(draft).replace(path)
+    finally:
+        Path(draft).unlink(missing_ok=True)
+
+
+@router.get("/openapi.json", include_in_schema=False)
+async def openapi(request: Request) -> JSONResponse:
+    """The REST interface, described for programs."""
+    return JSONResponse(request.app.openapi())
+
+
+@router.get("/docs", include_in_schema=False)
+async def docs(request: Request) -> HTMLResponse:
+    """The REST interface, described for people."""
+    return routes_page(request.app.openapi())

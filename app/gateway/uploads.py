@@ -1,0 +1,115 @@
+"""Reading an upload: the size is watched while it streams in, not after."""
+
+from dataclasses import dataclass
+
+from fastapi import Request
+from starlette.datastructures import UploadFile
+from starlette.types import Message
+
+from app.errors import Invalid, RequestError, TooLarge
+
+MAX_IMAGES = 50
+OVERHEAD = 64 * 1024
+"""Bytes of multipart wrapping that do not count."""
+
+
+class UnsupportedMedia(RequestError):
+    """A body of a kind that this route does not read."""
+
+    default_code = "unsupported_media_type"
+    status = 415
+
+
+@dataclass(frozen=True)
+class Upload:
+    """The parts of a multipart body."""
+
+    fields: dict[str, str]
+    images: list[bytes]
+
+
+def _too_large(limit: int) -> TooLarge:
+    return TooLarge(f"an upload may have {limit} bytes in all", limit=limit)
+
+
+def _limited(request: Request, limit: int) -> Request:
+    """The request with a body that raises once it is over ``limit`` bytes."""
+    declared = request.headers.get("content-length", "0")
+    if declared.isdecimal() and int(declared) > limit + OVERHEAD:
+        raise _too_large(limit)
+    seen = 0
+    inner = request.receive
+
+    async def receive() -> Message:
+        nonlocal seen
+        message = await inner()
+        if message["type"] == "http.request":
+            seen += len(message.get("body", b""))
+            if seen > limit + OVERHEAD:
+                raise _too_large(limit)
+        return message
+
+    return Request(request.scope, receive)
+
+
+async def read_upload(request: Request, limit: int, image_field: str) -> Upload:
+    """Read a multipart body with text fields and images.
+
+    Args:
+        request: The request, its body unread.
+        limit: Bytes allowed in all.
+        image_field: Name of the fields that hold images.
+
+    Raises:
+        TooLarge: over the limit; raised as soon as it is.
+        UnsupportedMedia: not multipart/form-data.
+        Invalid: a field twice, unknown or of the wrong kind.
+    """
+    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    if kind != "multipart/form-data":
+        raise UnsupportedMedia(f"send multipart/form-data, not {kind or 'nothing'}", given=kind)
+    fields: dict[str, str] = {}
+    images: list[bytes] = []
+    limited = _limited(request, limit)
+    async with limited.form(max_files=MAX_IMAGES, max_fields=8) as form:
+        for name, value in form.multi_items():
+            if isinstance(value, UploadFile):
+                if name != image_field:
+                    raise Invalid(f"files belong in {image_field!r}, not in {name!r}", field=name)
+                image = await value.read()
+                if len(image) > limit:
+                    raise _too_large(limit)
+                images.append(image)
+            elif name == image_field:
+                raise Invalid(f"{image_field!r} must be files", field=name)
+            elif name in fields:
+                raise Invalid(f"the field {name!r} was given twice", field=name)
+            else:
+                fields[name] = value
+    if sum(map(len, images)) > limit:
+        raise _too_large(limit)
+    return Upload(fields, images)
+
+
+async def read_image(request: Request, limit: int) -> bytes:
+    """Read one image: the whole body, or the field ``image`` of a multipart body.
+
+    Raises:
+        TooLarge, Invalid, UnsupportedMedia: as :func:`read_upload`.
+    """
+    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    if kind == "multipart/form-data":
+        upload = await read_upload(request, limit, "image")
+        if len(upload.images) != 1:
+            raise Invalid(f"send one image, not {len(upload.images)}", field="image")
+        return upload.images[0]
+    if not kind.startswith("image/") and kind not in ("", "application/octet-stream"):
+        raise UnsupportedMedia(f"send an image or multipart/form-data, not {kind}", given=kind)
+    parts = []
+    size = 0
+    async for part in _limited(request, limit).stream():
+        size += len(part)
+        if size > limit:
+            raise _too_large(limit)
+        parts.append(part)
+    return b"".join(parts)

@@ -1,0 +1,149 @@
+"""The live 3D view: the arm from its own URDF, the things around it, moved by the robot's states.
+
+A thread follows the robot and updates the scene only while somebody looks. viser's own server runs
+in a further thread; a failure in either shows in the log and stops nothing else.
+"""
+
+import contextlib
+import io
+import logging
+import threading
+from typing import Any
+
+import numpy as np
+import viser
+from viser.extras import ViserUrdf
+
+from app.gateway.robot_port import RobotPort
+from app.link.messages import Description, ObjectDescription, ObjectState, State
+
+log = logging.getLogger(__name__)
+
+PERIOD_S = 0.05
+RETRY_S = 2.0
+"""After the scene could not be built or updated."""
+CAMERA_POSITION = (1.75, -1.45, 1.25)
+CAMERA_LOOK_AT = (0.35, 0.0, 0.35)
+"""m, in the robot's base frame: from the front right, the table and the whole arm in view."""
+BACKGROUND = (0.80, 0.84, 0.88)
+
+
+def _quiet() -> contextlib.redirect_stdout[io.StringIO]:
+    """viser prints its address and its end; standard output is for our link alone."""
+    return contextlib.redirect_stdout(io.StringIO())
+
+
+class ViserScene:
+    """One robot in 3D, served on a free port of the loopback interface.
+
+    Args:
+        robot: Whose states to follow.
+    """
+
+    def __init__(self, robot: RobotPort) -> None:
+        self._robot = robot
+        with _quiet():
+            self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        self.port: int = self._server.get_port()
+        self._ending = threading.Event()
+        self._described: Description | None = None
+        self._urdf: ViserUrdf | None = None
+        self._order: list[int | None] = []
+        self._handles: list[Any] = []
+        self._objects: dict[str, Any] = {}
+        self._shown: int | None = None
+        self._dress()
+        self._thread = threading.Thread(target=self._run, name="viser-scene", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the thread and the server."""
+        self._ending.set()
+        self._thread.join(timeout=1.0)
+        with _quiet():
+            self._server.stop()
+
+    def _dress(self) -> None:
+        """What does not depend on the robot: light, ground, the first view, no panels."""
+        server = self._server
+        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        server.scene.set_up_direction("+z")
+        server.scene.world_axes.visible = False
+        server.initial_camera.position = CAMERA_POSITION
+        server.initial_camera.look_at = CAMERA_LOOK_AT
+        server.initial_camera.up = (0.0, 0.0, 1.0)
+        server.initial_camera.fov = np.radians(45.0)
+        background = np.full((2, 2, 3), [round(255 * part) for part in BACKGROUND], np.uint8)
+        server.scene.set_background_image(background)
+
+    def _run(self) -> None:
+        while not self._ending.wait(PERIOD_S):
+            try:
+                self._follow()
+            except Exception:
+                log.exception("the 3D view could not be updated")
+                self._ending.wait(RETRY_S)
+
+    def _follow(self) -> None:
+        description, state = self._robot.description, self._robot.state
+        if description is not None and description != self._described:
+            self._build(description)
+        if state is None or self._urdf is None or state.tick == self._shown:
+            return
+        # The first state is shown even when nobody looks: whoever comes next starts from there.
+        if self._shown is not None and not self._server.get_clients():
+            return
+        with self._server.atomic():
+            self._update(state)
+        self._shown = state.tick
+
+    def _build(self, description: Description) -> None:
+        from app.robot.models import model_assets
+
+        for handle in self._handles:
+            handle.remove()
+        if self._urdf is not None:
+            self._urdf.remove()
+        self._handles, self._objects, self._shown = [], {}, None
+        assets = model_assets(description.model)
+        self._urdf = ViserUrdf(self._server, assets.urdf_path, root_node_name="/robot")
+        arm = {joint.name: index for index, joint in enumerate(description.joints)}
+        self._order = [arm.get(name) for name in self._urdf.get_actuated_joint_names()]
+        self._handles.append(
+            self._server.scene.add_grid(
+                "/grid", width=6.0, height=6.0, cell_size=0.25, section_size=1.0,
+                cell_color=(170, 178, 188), section_color=(140, 150, 162),
+            )
+        )  # fmt: skip
+        for thing in description.objects:
+            self._objects[thing.name] = self._add(thing)
+        self._handles += self._objects.values()
+        self._described = description
+
+    def _add(self, thing: ObjectDescription) -> Any:
+        red, green, blue, alpha = thing.colour
+        colour = (round(red * 255), round(green * 255), round(blue * 255))
+        name = f"/objects/{thing.name}"
+        opacity = None if alpha >= 1.0 else alpha
+        scene = self._server.scene
+        if thing.shape == "box":
+            return scene.add_box(name, color=colour, dimensions=thing.size, opacity=opacity)
+        diameter, _, height = thing.size
+        return scene.add_cylinder(
+            name, radius=diameter / 2, height=height, color=colour, opacity=opacity
+        )
+
+    def _update(self, state: State) -> None:
+        assert self._urdf is not None
+        # Joints that the description does not name are the fingers: each takes half the width.
+        finger = state.gripper / 2
+        angles = [finger if index is None else state.joints[index] for index in self._order]
+        self._urdf.update_cfg(np.asarray(angles))
+        for thing in state.objects:
+            self._place(thing)
+
+    def _place(self, thing: ObjectState) -> None:
+        handle = self._objects.get(thing.name)
+        if handle is not None:
+            handle.position = thing.position
+            handle.wxyz = thing.orientation
