@@ -41,9 +41,14 @@ class Server:
     def node(self) -> psutil.Process:
         """The robot node, a child of the gateway."""
         for child in psutil.Process(self.process.pid).children():
-            if "camera" not in " ".join(child.cmdline()):
+            if "--endpoint" in child.cmdline():
                 return child
         raise AssertionError("the gateway has no robot node")
+
+    def endpoint(self) -> str:
+        """The Zenoh endpoint that the robot node listens on."""
+        words = self.node().cmdline()
+        return words[words.index("--endpoint") + 1]
 
 
 def start_server(folder: Path, *options: str) -> Server:

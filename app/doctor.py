@@ -1,0 +1,189 @@
+"""``farhand doctor``: what Farhand needs of this machine, checked by using it."""
+
+import os
+import platform
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from app.config import Settings
+from app.errors import FarhandError
+
+_NODE_START_S = 20.0
+_RENDER_FPS_WANTED = 20
+"""Pictures a second from each of two cameras; below that driving by picture feels late."""
+
+
+class Finding(NamedTuple):
+    """What one check found."""
+
+    fine: bool
+    text: str
+    mend: str = ""
+    """What to do about it, when it is not fine."""
+
+
+def check_python(settings: Settings) -> Finding:
+    """The interpreter PyBullet has wheels for, and enough cores."""
+    cores = os.cpu_count() or 1
+    text = f"Python {platform.python_version()} on {platform.machine()}, {cores} cores"
+    if sys.version_info[:2] != (3, 11):
+        return Finding(False, text, "use Python 3.11: PyBullet has no wheels for newer ones")
+    if cores < 2:
+        return Finding(False, text, "two cores are needed: one for control, one for pictures")
+    return Finding(True, text)
+
+
+def check_pybullet(settings: Settings) -> Finding:
+    """PyBullet hands pictures over as arrays, not as tuples of a million numbers."""
+    from app.robot.sim.world import connect, disconnect
+
+    disconnect(connect())
+    return Finding(True, "PyBullet runs, with numpy")
+
+
+def check_renderer(settings: Settings) -> Finding:
+    """Both cameras rendered as the camera process does, and how fast."""
+    from app.robot.sim.renderer import measure_rate
+
+    rate = measure_rate("puma560", seconds=2.0)
+    text = f"renders both cameras {rate:.0f} times a second"
+    if rate < _RENDER_FPS_WANTED:
+        return Finding(False, text, "pictures will lag: use a faster machine or a GPU")
+    return Finding(True, text)
+
+
+def check_codecs(settings: Settings) -> Finding:
+    """JPEG both ways, PNG, and the video format of the demonstration."""
+    import cv2
+    import simplejpeg
+
+    picture = np.tile(np.arange(160, dtype=np.uint8), (120, 1))
+    colour = np.ascontiguousarray(np.stack([picture] * 3, axis=-1))
+    again = simplejpeg.decode_jpeg(simplejpeg.encode_jpeg(colour, quality=90))
+    if np.abs(again.astype(int) - colour).mean() > 3:
+        return Finding(False, "JPEG does not survive a round trip", "reinstall simplejpeg")
+    if not cv2.imencode(".png", picture)[0] or not cv2.imencode(".webp", picture)[0]:
+        return Finding(False, "OpenCV cannot write PNG or WebP", "reinstall opencv-python-headless")
+    with tempfile.TemporaryDirectory() as folder:
+        writer = cv2.VideoWriter(
+            str(Path(folder) / "check.webm"), cv2.VideoWriter.fourcc(*"VP80"), 15, (160, 120)
+        )
+        opened = writer.isOpened()
+        writer.release()
+    if not opened:
+        return Finding(
+            False,
+            "OpenCV cannot write WebM, so the demonstration without a camera does not play",
+            "install opencv-python-headless from its wheel, which brings FFmpeg",
+        )
+    return Finding(True, "JPEG, PNG, WebP and WebM work")
+
+
+def check_port(settings: Settings) -> Finding:
+    """The port can be listened on."""
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as listener:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listener.bind((settings.host, settings.port))
+        except OSError as error:
+            return Finding(
+                False,
+                f"{settings.host}:{settings.port} cannot be listened on: {error.strerror}",
+                "stop what uses it, or choose another with --port",
+            )
+    return Finding(True, f"{settings.host}:{settings.port} is free")
+
+
+def check_database(settings: Settings) -> Finding:
+    """The gesture database opens; a missing one is made from the starter set, elsewhere."""
+    from app.gateway.gallery import open_store
+
+    if settings.database_url is None and not settings.data_dir.exists():
+        with tempfile.TemporaryDirectory() as folder:
+            store = open_store(settings.model_copy(update={"data_dir": Path(folder)}))
+            count = len(store.list())
+            store.close()
+        return Finding(True, f"no database yet; a new one will hold {count} starter gestures")
+    store = open_store(settings)
+    count = len(store.list())
+    store.close()
+    return Finding(True, f"the gesture database holds {count} gestures")
+
+
+def check_node(settings: Settings) -> Finding:
+    """A robot node of its own starts, describes itself, reports its state and can be stopped."""
+    from app.link.gateway_end import GatewayEnd
+    from app.link.messages import StopRequest
+    from app.link.session import socket_endpoint
+
+    with tempfile.TemporaryDirectory(prefix="farhand-") as folder:
+        endpoint = socket_endpoint(Path(folder) / "node.sock")
+        began = time.monotonic()
+        node = subprocess.Popen(
+            [sys.executable, "-m", "app.robot.node", "--id", "doctor", "--endpoint", endpoint],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        try:
+            with GatewayEnd("doctor", endpoint, timeout=_NODE_START_S) as link:
+                _wait(lambda: link.state is not None, _NODE_START_S)
+                started = time.monotonic() - began
+                name = link.describe(timeout=5.0).name
+                asked = time.monotonic()
+                link.stop(StopRequest(source="doctor", reason="a check"))
+                _wait(lambda: link.state is not None and link.state.mode == "stopped", 5.0)
+                stopped = time.monotonic() - asked
+        finally:
+            node.terminate()
+            node.wait(10)
+    return Finding(
+        True,
+        f"a node of {name} answers after {started:.1f} s and stops after {stopped * 1e3:.0f} ms",
+    )
+
+
+def _wait(condition: Callable[[], bool], seconds: float) -> None:
+    deadline = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > deadline:
+            raise TimeoutError(f"no answer within {seconds:g} s")
+        time.sleep(0.005)
+
+
+CHECKS: dict[str, Callable[[Settings], Finding]] = {
+    "python": check_python,
+    "pybullet": check_pybullet,
+    "renderer": check_renderer,
+    "codecs": check_codecs,
+    "port": check_port,
+    "database": check_database,
+    "robot node": check_node,
+}
+
+
+def run_checks(settings: Settings) -> bool:
+    """Run all checks and print a line each. Returns whether everything is fine."""
+    all_fine = True
+    for name, check in CHECKS.items():
+        try:
+            finding = check(settings)
+        except FarhandError as error:
+            finding = Finding(False, error.message)
+        except (ImportError, OSError, TimeoutError, subprocess.SubprocessError) as error:
+            finding = Finding(
+                False, f"{type(error).__name__}: {error}", "run `make run` again to set up anew"
+            )
+        all_fine &= finding.fine
+        print(f"{'ok  ' if finding.fine else 'FAIL'} {name:11} {finding.text}", flush=True)
+        if finding.mend:
+            print(f"{'':16} -> {finding.mend}")
+    return all_fine
