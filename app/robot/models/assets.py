@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.errors import CannotStart
 from app.robot.models.model import Model, load_model, model_folder
@@ -91,7 +92,7 @@ def _build(folder: Path, file: str, urdf: str, meshes: dict[str, Path]) -> Path:
     (draft / "meshes").mkdir()
     for name, path in meshes.items():
         mesh = f"meshes/{path.stem}.stl"
-        (draft / mesh).write_bytes(clean_stl(path))
+        (draft / mesh).write_bytes(write_stl(read_stl(path)))
         urdf = urdf.replace(name, f'"{mesh}"')
     (draft / file).write_text(urdf, "utf-8")
     if draft != folder:
@@ -102,11 +103,8 @@ def _build(folder: Path, file: str, urdf: str, meshes: dict[str, Path]) -> Path:
     return folder
 
 
-def clean_stl(path: Path) -> bytes:
-    """The triangles of an STL file, text or binary, as a binary STL that every reader accepts.
-
-    Its header is zeros (one that begins with ``solid`` reads as text) and it has no attribute bytes
-    and no triangles without an area; normals are computed anew.
+def read_stl(path: Path) -> NDArray[np.float32]:
+    """The corners (shape (n, 3, 3)) of the triangles of an STL file, text or binary.
 
     Raises:
         CannotStart: the file is not an STL file.
@@ -114,18 +112,26 @@ def clean_stl(path: Path) -> bytes:
     raw = path.read_bytes()
     count = int.from_bytes(raw[80:84], "little")
     if count and len(raw) == 84 + count * _TRIANGLE.itemsize:
-        corners = np.frombuffer(raw, _TRIANGLE, count, 84)["corners"]
-    else:
-        numbers = [line.split()[1:] for line in raw.split(b"\n") if b"vertex" in line]
-        try:
-            corners = np.array(numbers, dtype="<f4").reshape(-1, 3, 3)
-        except ValueError:
-            corners = np.empty((0, 3, 3), "<f4")
+        return np.asarray(np.frombuffer(raw, _TRIANGLE, count, 84)["corners"])
+    numbers = [line.split()[1:] for line in raw.split(b"\n") if b"vertex" in line]
+    try:
+        corners = np.array(numbers, dtype=np.float32).reshape(-1, 3, 3)
+    except ValueError:
+        corners = np.empty((0, 3, 3), np.float32)
+    if not len(corners):
+        raise CannotStart(f"{path} is not an STL file", file=str(path))
+    return corners
+
+
+def write_stl(corners: NDArray[np.float32]) -> bytes:
+    """Triangles (shape (n, 3, 3)) as a binary STL file that every reader accepts.
+
+    The header is zeros (one that begins with ``solid`` reads as text); triangles without an area
+    are left out.
+    """
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1)
     keep = length > 1e-12
-    if not keep.any():
-        raise CannotStart(f"{path} is not an STL file", file=str(path))
     triangles = np.zeros(int(keep.sum()), _TRIANGLE)
     triangles["corners"] = corners[keep]
     triangles["normal"] = normals[keep] / length[keep, None]

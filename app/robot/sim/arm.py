@@ -19,8 +19,8 @@ from app.robot.sim.world import (
 _POSITION_GAIN = 0.3
 """Part of a position error that the motors take back in one step."""
 _SOLVER_ITERATIONS = 120
-"""With Bullet's usual 50 the chain brakes, coupled fingers, held thing does not converge, and things
-slip; 120 leave no slip that can be measured. Most steps end early, by the residual."""
+"""With Bullet's usual 50 the chain of brakes, coupled fingers and held thing does not converge, and
+things slip; 120 leave no slip that can be measured. Most steps end early, by the residual."""
 _BRAKED_SPEED = 0.005
 """rad/s; slower than this, a braking joint counts as standing and is locked where it is."""
 

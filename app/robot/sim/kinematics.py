@@ -57,7 +57,7 @@ class SerialKinematics:
         first, second, third, axes, revolute, limits = [], [], [], [], [], []
         self.names: list[str] = []
         for joint in chain:
-            fixed = fixed @ _origin(joint)
+            fixed = fixed @ origin_of(joint)
             kind = joint.get("type")
             if kind == "fixed":
                 continue
@@ -247,9 +247,9 @@ def _limits(joint: ElementTree.Element) -> tuple[float, float]:
     return float(limit.get("lower", 0)), float(limit.get("upper", 0))
 
 
-def _origin(joint: ElementTree.Element) -> Matrix:
-    """The 4x4 transform of a URDF ``<origin>``: turned about fixed X, Y, Z, then moved."""
-    origin = joint.find("origin")
+def origin_of(element: ElementTree.Element) -> Matrix:
+    """The 4x4 transform of an element's ``<origin>``: turned about fixed X, Y, Z, then moved."""
+    origin = element.find("origin")
     roll, pitch, yaw = _numbers(origin, "rpy", (0.0, 0.0, 0.0))
     cr, sr = math.cos(roll), math.sin(roll)
     cp, sp = math.cos(pitch), math.sin(pitch)

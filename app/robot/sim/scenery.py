@@ -1,0 +1,216 @@
+"""What the pictures show of a robot: worlds for drawing only, and outlines for the shadows."""
+
+import math
+import tempfile
+from collections.abc import Callable, Iterable, Sequence
+from itertools import pairwise
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+
+from app.robot.models import ModelAssets, ObjectModel
+from app.robot.models.assets import read_stl
+from app.robot.sim.kinematics import origin_of
+from app.robot.sim.lens import Matrix
+from app.robot.sim.shadow import outline
+from app.robot.sim.world import connect, load_robot, upright
+
+_SKIRT = 0.004
+"""m; thickness of the boards that stand for the sides of a table whose top is drawn apart."""
+
+
+class Stage:
+    """A Bullet world with visual shapes and no physics.
+
+    Args:
+        assets: The robot's model.
+        links: Says, by a link's name, whether it is drawn.
+        things: Objects to draw.
+        prepare: Called with the new world's client before anything is loaded.
+    """
+
+    def __init__(
+        self,
+        assets: ModelAssets,
+        links: Callable[[str], bool],
+        things: Iterable[ObjectModel],
+        prepare: Callable[[int], None] = lambda client: None,
+    ) -> None:
+        self.client = connect()
+        prepare(self.client)
+        self.body, self._joints, self.links = _load_visuals(self.client, assets, links)
+        self._driven = [self._joints[joint.name] for joint in assets.model.joints]
+        self._fingers = [self._joints[name] for name in assets.model.gripper.fingers]
+        self.things = {thing.name: add_visual(self.client, thing) for thing in things}
+
+    def pose(self, joints: Iterable[float], gripper: float) -> None:
+        """Put the robot's joints (rad) and its fingers (m between them) somewhere."""
+        half = gripper / 2
+        for index, angle in zip(self._driven, joints, strict=True):
+            pybullet.resetJointState(self.body, index, angle, physicsClientId=self.client)
+        for index in self._fingers:
+            pybullet.resetJointState(self.body, index, half, physicsClientId=self.client)
+
+    def put(self, name: str, position: tuple[float, ...], orientation: tuple[float, ...]) -> None:
+        """Put a thing somewhere (m; quaternion w, x, y, z). Unknown names are passed over."""
+        body = self.things.get(name)
+        if body is not None:
+            w, x, y, z = orientation
+            pybullet.resetBasePositionAndOrientation(
+                body, position, (x, y, z, w), physicsClientId=self.client
+            )
+
+    def frames(self, links: list[int]) -> list[Matrix]:
+        """The 4x4 frames of links, base frame; -1 is the base link."""
+        states = pybullet.getLinkStates(
+            self.body,
+            [link for link in links if link >= 0],
+            computeForwardKinematics=True,
+            physicsClientId=self.client,
+        )
+        moved = iter(frame_of(state[4], state[5]) for state in states)
+        return [next(moved) if link >= 0 else np.eye(4) for link in links]
+
+    def close(self) -> None:
+        """Give the world back."""
+        if pybullet.isConnected(self.client):
+            pybullet.disconnect(self.client)
+
+
+def add_visual(client: int, thing: ObjectModel) -> int:
+    """Put one thing into a world for pictures; returns its body id.
+
+    Of a thing with a grid only the sides: its top is drawn by the backdrop.
+    """
+    if thing.grid:
+        x, y, z = (edge / 2 for edge in thing.size)
+        thin = _SKIRT / 2
+        sides = [(x - thin, 0.0), (thin - x, 0.0), (0.0, y - thin), (0.0, thin - y)]
+        shapes = pybullet.createVisualShapeArray(
+            shapeTypes=[pybullet.GEOM_BOX] * 4,
+            halfExtents=[[thin, y, z], [thin, y, z], [x, thin, z], [x, thin, z]],
+            rgbaColors=[thing.colour] * 4,
+            visualFramePositions=[[dx, dy, -0.001] for dx, dy in sides],
+            physicsClientId=client,
+        )
+    elif thing.shape == "box":
+        shapes = pybullet.createVisualShape(
+            pybullet.GEOM_BOX,
+            halfExtents=[edge / 2 for edge in thing.size],
+            rgbaColor=thing.colour,
+            physicsClientId=client,
+        )
+    else:
+        # Bullet's own cylinder is drawn with round edges; this one is cut clean.
+        corners, normals = _cylinder_triangles(thing.size[0] / 2, thing.size[2])
+        shapes = pybullet.createVisualShape(
+            pybullet.GEOM_MESH,
+            vertices=corners.tolist(),
+            normals=normals.tolist(),
+            indices=list(range(len(corners))),
+            rgbaColor=thing.colour,
+            physicsClientId=client,
+        )
+    return int(
+        pybullet.createMultiBody(
+            0,
+            -1,
+            shapes,
+            basePosition=thing.position,
+            baseOrientation=upright(thing.turn),
+            physicsClientId=client,
+        )
+    )
+
+
+def frame_of(position: Sequence[float], quaternion: Sequence[float]) -> Matrix:
+    """A 4x4 frame from Bullet's position and quaternion x, y, z, w."""
+    frame = np.eye(4)
+    frame[:3, :3] = np.array(pybullet.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
+    frame[:3, 3] = position
+    return frame
+
+
+def link_outlines(assets: ModelAssets) -> dict[str, Matrix]:
+    """Outline points (m, shape (n, 3)) of each link's visual shapes, in the link's frame."""
+    root = ElementTree.parse(assets.urdf_path).getroot()
+    result = {}
+    for link in root.findall("link"):
+        points = [_visual_points(visual, assets.urdf_path) for visual in link.findall("visual")]
+        if points:
+            result[link.get("name", "")] = outline(np.concatenate(points))
+    return result
+
+
+def thing_outline(thing: ObjectModel) -> Matrix:
+    """Outline points (m, shape (n, 3)) of a thing, in its own frame."""
+    if thing.shape == "box":
+        return _box(np.array(thing.size))
+    return _cylinder(thing.size[0] / 2, thing.size[2])
+
+
+def _load_visuals(
+    client: int, assets: ModelAssets, links: Callable[[str], bool]
+) -> tuple[int, dict[str, int], dict[str, int]]:
+    """Load the robot without collision shapes, and without the visuals of links not drawn."""
+    tree = ElementTree.parse(assets.urdf_path)
+    for link in tree.getroot().findall("link"):
+        drawn = links(link.get("name", ""))
+        for part in list(link):
+            if part.tag == "collision" or (part.tag == "visual" and not drawn):
+                link.remove(part)
+    for mesh in tree.getroot().iter("mesh"):
+        mesh.set("filename", str(assets.urdf_path.parent / mesh.get("filename", "")))
+    with tempfile.TemporaryDirectory(prefix="farhand-") as folder:
+        path = Path(folder) / "visuals.urdf"
+        tree.write(path)
+        return load_robot(client, path)
+
+
+def _visual_points(visual: ElementTree.Element, urdf: Path) -> Matrix:
+    frame = origin_of(visual)
+    box, cylinder = visual.find("geometry/box"), visual.find("geometry/cylinder")
+    mesh = visual.find("geometry/mesh")
+    if box is not None:
+        points = _box(np.array([float(word) for word in box.get("size", "").split()]))
+    elif cylinder is not None:
+        points = _cylinder(float(cylinder.get("radius", 0)), float(cylinder.get("length", 0)))
+    elif mesh is not None:
+        points = _stl_points(urdf.parent / mesh.get("filename", ""))
+    else:
+        points = np.zeros((1, 3))
+    return np.asarray(points @ frame[:3, :3].T + frame[:3, 3])
+
+
+def _box(size: NDArray[np.float64]) -> Matrix:
+    signs = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T
+    return np.asarray(signs * size)
+
+
+def _cylinder(radius: float, length: float) -> Matrix:
+    turn = np.linspace(0, 2 * math.pi, 16, endpoint=False)
+    ring = np.stack([radius * np.cos(turn), radius * np.sin(turn), np.full(16, length / 2)], 1)
+    return np.concatenate([ring, ring * [1, 1, -1]])
+
+
+def _cylinder_triangles(radius: float, length: float, sides: int = 24) -> tuple[Matrix, Matrix]:
+    """Corners and normals (shape (n, 3)), three a triangle: a round side and two flat ends."""
+    turn = np.linspace(0, 2 * math.pi, sides + 1)
+    out = np.stack([np.cos(turn), np.sin(turn), np.zeros(sides + 1)], 1)
+    half, up = np.array([0.0, 0.0, length / 2]), np.array([0.0, 0.0, 1.0])
+    corners: list[Matrix] = []
+    normals: list[Matrix] = []
+    for a, b in pairwise(out):
+        p, q = a * radius, b * radius
+        corners += [p - half, q - half, q + half, p - half, q + half, p + half]
+        normals += [a, b, b, a, b, a]
+        corners += [p + half, q + half, half, q - half, p - half, -half]
+        normals += [up, up, up, -up, -up, -up]
+    return np.array(corners), np.array(normals)
+
+
+def _stl_points(path: Path) -> Matrix:
+    return np.asarray(read_stl(path).reshape(-1, 3), dtype=np.float64)
