@@ -82,6 +82,58 @@ class _Moment:
     """0: in place; 1: out of view."""
 
 
+class _Cutout(NamedTuple):
+    """The part of a sprite that is not empty, ready to be put anywhere."""
+
+    planes: NDArray[np.float32]
+    """Colour times cover and cover, shape (h, w, 4), with an empty edge of one pixel."""
+    top: int
+    left: int
+
+    @classmethod
+    def of(cls, sprite: HandSprite) -> "_Cutout":
+        rows = np.flatnonzero(sprite.cover.max(axis=1) > 0.001)
+        columns = np.flatnonzero(sprite.cover.max(axis=0) > 0.001)
+        top, left = max(int(rows[0]) - 2, 0), max(int(columns[0]) - 2, 0)
+        right = int(columns[-1]) + 3
+        planes = np.dstack(sprite)[top:, left:right]
+        # Below the lower edge of the picture is more arm.
+        planes = np.pad(planes, ((0, 4), (0, 0), (0, 0)), mode="edge")
+        return cls(planes, top, left)
+
+    def paste(
+        self, picture: Image, background: NDArray[np.float32], shift: NDArray[np.float64]
+    ) -> None:
+        """Put it before the background, moved right and down by ``shift`` pixels, in place."""
+        whole = np.floor(shift).astype(int)
+        part = shift - whole
+        height, width = self.planes.shape[:2]
+        matrix = np.array([[1.0, 0.0, part[0]], [0.0, 1.0, part[1]]])
+        moved = np.asarray(
+            cv2.warpAffine(
+                self.planes,
+                matrix,
+                (width, height),
+                flags=cv2.INTER_LINEAR,
+                borderMode=cv2.BORDER_REPLICATE,
+            ),
+            np.float32,
+        )
+        top, left = self.top + whole[1], self.left + whole[0]
+        from_row, from_column = max(-top, 0), max(-left, 0)
+        to_row = min(height, picture.shape[0] - top)
+        to_column = min(width, picture.shape[1] - left)
+        if from_row >= to_row or from_column >= to_column:
+            return
+        moved = moved[from_row:to_row, from_column:to_column]
+        window = (
+            slice(top + from_row, top + to_row),
+            slice(left + from_column, left + to_column),
+        )
+        sprite = HandSprite(moved[..., :3], moved[..., 3])
+        picture[window] = to_bytes(compose(sprite, background[window]))
+
+
 class SyntheticOperator:
     """Frames of an operator who follows a script. The same arguments give the same frames.
 
@@ -137,26 +189,26 @@ class SyntheticOperator:
         """The frames, BGR uint8, shape (height, width, 3)."""
         generator = np.random.default_rng(self._seed)
         background = through_lens(backdrop(self.size, self.look), self.look)
+        plain = to_bytes(background)
         tremor = _tremble(len(self._moments), self.fps, self._tremor, generator)
         # Eight planes of noise, shifted about, in place of new noise for each frame.
-        noises = generator.normal(0.0, self.look.noise, (8, *background.shape)).astype(np.float32)
-        last: tuple[HandPose, HandSprite] | None = None
+        noises = generator.normal(0.0, self.look.noise, (8, *plain.shape)).round().astype(np.int16)
+        last: tuple[HandPose, _Cutout] | None = None
         for number, moment in enumerate(self._moments):
-            picture = background
+            picture = plain.copy()
             if moment.lowered < 1.0:
                 if last is None or last[0] != moment.pose:
                     sprite = render_sprite(moment.pose, self.size, self.view, self.look, fine=1)
                     # Blur and uneven light once a pose, not once a frame.
-                    last = (
-                        moment.pose,
-                        HandSprite(*(through_lens(plane, self.look) for plane in sprite)),
-                    )
+                    seen = HandSprite(*(through_lens(plane, self.look) for plane in sprite))
+                    last = moment.pose, _Cutout.of(seen)
                 shift = tremor[number] + [0.0, moment.lowered * self.size[1]]
-                picture = compose(_shifted(last[1], shift), background)
+                last[1].paste(picture, background, shift)
             if self.look.noise:
                 aside = int(generator.integers(0, self.size[0]))
-                picture = picture + np.roll(noises[number % 8], aside, axis=1)
-            yield to_bytes(picture)
+                noise = np.roll(noises[number % 8], aside, axis=1)
+                picture = np.asarray(cv2.add(picture, noise, dtype=cv2.CV_8U), np.uint8)
+            yield picture
 
 
 def parse_script(text: str) -> tuple[Step, ...]:
@@ -303,16 +355,3 @@ def _tremble(
     tremor = strength * np.sin(2 * np.pi * TREMOR_HZ * t + phase[1] + np.sin(t + phase[2]))
     sway = np.sin(2 * np.pi * 0.23 * t + phase[3])
     return np.asarray(amount * (np.sqrt(2) * tremor + sway))
-
-
-def _shifted(sprite: HandSprite, shift: NDArray[np.float64]) -> HandSprite:
-    matrix = np.array([[1.0, 0.0, shift[0]], [0.0, 1.0, shift[1]]])
-    height, width = sprite.cover.shape
-    # What lies beyond the lower edge is more arm.
-    colour, cover = (
-        cv2.warpAffine(
-            plane, matrix, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-        )
-        for plane in sprite
-    )
-    return HandSprite(np.asarray(colour, np.float32), np.asarray(cover, np.float32))
