@@ -2,7 +2,8 @@
 
 import { api } from "./core/api.js";
 import { CameraFeed } from "./core/camera-feed.js";
-import { FrameSender, grabStill } from "./core/frame-sender.js";
+import { FrameSender } from "./core/frame-sender.js";
+import { grabStill } from "./core/jpeg.js";
 import { changesFor, INITIAL_STATE } from "./core/messages.js";
 import { OperatorLink } from "./core/operator-link.js";
 import { SourceKeeper } from "./core/source-keeper.js";
@@ -20,7 +21,6 @@ import { readout } from "./ui/readout.js";
 import { sentence } from "./ui/sentence.js";
 import { askContent, goneContent, helpContent, Sheets } from "./ui/sheets.js";
 import { stage } from "./ui/stage.js";
-import { teachContent } from "./ui/teach.js";
 import { describeError } from "./ui/words.js";
 
 const byId = (id) => document.getElementById(id);
@@ -266,7 +266,9 @@ function start() {
     sheets.show("start", texts.actions.start, box, { focus: choices[0] });
 }
 
-function teach(gesture = null) {
+async function teach(gesture = null) {
+    // Loaded when first needed: most who drive never teach.
+    const { teachContent } = await import("./ui/teach.js");
     const { content, focus, close } = teachContent({
         gesture,
         store,

@@ -1,52 +1,21 @@
 // From a playing <video> to JPEG frames on the operator link, newest first.
 
+import { JpegEncoder } from "./jpeg.js";
+
 const IN_FLIGHT = 2;
 const FORGET_MS = 1000; // an answer that has not come by then will not come
-const WIDEST = 640;
 const QUALITY = 0.8;
 const BACKLOG_BYTES = 96 * 1024; // what may wait in the browser before frames are left out
 const FALLBACK_INTERVAL_MS = 33;
 
-function makeCanvas() {
-    if (typeof OffscreenCanvas === "function") return new OffscreenCanvas(16, 16);
-    return document.createElement("canvas");
-}
-
-function encodeJpeg(canvas, quality) {
-    if (canvas.convertToBlob) return canvas.convertToBlob({ type: "image/jpeg", quality });
-    return new Promise((resolve, reject) =>
-        canvas.toBlob(
-            (blob) => (blob ? resolve(blob) : reject(new Error("no JPEG encoder"))),
-            "image/jpeg",
-            quality,
-        ),
-    );
-}
-
-/** The picture size to send for a video of this size: at most 640 wide, never enlarged. */
-export function sentSize(width, height) {
-    const scale = Math.min(1, WIDEST / width, 720 / height);
-    return [Math.max(1, Math.round(width * scale)), Math.max(1, Math.round(height * scale))];
-}
-
-/** One still of `video` as a JPEG Blob; null before the first picture. */
-export async function grabStill(video, quality = 0.92) {
-    if (!video.videoWidth) return null;
-    const canvas = makeCanvas();
-    [canvas.width, canvas.height] = sentSize(video.videoWidth, video.videoHeight);
-    canvas.getContext("2d").drawImage(video, 0, 0, canvas.width, canvas.height);
-    return encodeJpeg(canvas, quality);
-}
-
 /**
  * Sends each new picture of the video while fewer than two wait for their answer. Call `answered`
- * with the `seq` of every `frame` and `error` message. `onSent(width, height)` tells the size.
+ * with the `seq` of every `frame` and `error` message. `width` and `height` are of the last one sent.
  */
 export class FrameSender {
     #link;
     #video;
-    #canvas = makeCanvas();
-    #context;
+    #encoder = new JpegEncoder();
     #running = 0; // changes with every start and stop; old callbacks see that they are old
     #timer = 0;
     #seq = 0;
@@ -57,7 +26,6 @@ export class FrameSender {
     constructor(link, video) {
         this.#link = link;
         this.#video = video;
-        this.#context = this.#canvas.getContext("2d", { alpha: false });
         this.width = 0;
         this.height = 0;
         this.counts = { captured: 0, sent: 0, answered: 0, lost: 0 };
@@ -135,30 +103,24 @@ export class FrameSender {
             this.counts.lost += 1;
         }
         if (this.#inFlight.size >= IN_FLIGHT || this.#link.waitingBytes > BACKLOG_BYTES) return;
-        const video = this.#video;
-        if (!video.videoWidth) return;
         const capturedMs = this.#fresh;
         const run = this.#running;
         this.#fresh = null;
         this.#encoding = true;
         try {
-            const [width, height] = sentSize(video.videoWidth, video.videoHeight);
-            if (this.#canvas.width !== width || this.#canvas.height !== height) {
-                this.#canvas.width = width;
-                this.#canvas.height = height;
-            }
-            this.#context.drawImage(video, 0, 0, width, height);
-            const blob = await encodeJpeg(this.#canvas, QUALITY);
-            const jpeg = await blob.arrayBuffer();
-            if (run !== this.#running) return;
+            const picture = await this.#encoder.encode(this.#video, QUALITY);
+            if (!picture || run !== this.#running) return;
             const seq = this.#seq + 1;
-            if (!this.#link.sendFrame(seq, capturedMs, jpeg)) return;
+            if (!this.#link.sendFrame(seq, capturedMs, picture.jpeg)) return;
             this.#seq = seq;
             this.#inFlight.set(seq, { capturedMs, sentAt: performance.now() });
             this.sentTimes.push(performance.now());
             this.counts.sent += 1;
-            this.width = width;
-            this.height = height;
+            this.width = picture.width;
+            this.height = picture.height;
+        } catch (error) {
+            // A video that was just taken away gives no picture; anything else is worth knowing.
+            if (run === this.#running && error.name !== "InvalidStateError") throw error;
         } finally {
             this.#encoding = false;
         }

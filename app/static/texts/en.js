@@ -96,7 +96,7 @@ export const texts = Object.freeze({
         fault: (why) => `The robot is in trouble: ${why}`,
         faultUnknown: "no reason given",
         stopped: (why) => (why ? `Stopped: ${why}.` : "Stopped."),
-        stoppedNext: "Reset when it is safe to go on; nothing moves by that.",
+        stoppedNext: "Reset when it is safe; that moves nothing.",
         noSource: "Show the robot a hand: use your camera, or try it without one.",
         sourceStarting: "Waiting for the camera. Allow it in the browser if asked.",
         noControl: "Take control to drive.",
@@ -119,6 +119,7 @@ export const texts = Object.freeze({
     stage: {
         views: { wrist: "Wrist camera", scene: "Scene camera", "3d": "3D view" },
         enlarge: (view) => `Make the ${view} large`,
+        swap: "Swap wrist and scene (W)",
         noPicture: "No picture yet",
         noCamera: "The camera does not answer",
         age: (seconds) => `${seconds} s old`,
@@ -137,7 +138,7 @@ export const texts = Object.freeze({
         choose: "Camera",
         otherCamera: (number) => `Camera ${number}`,
         stop: "Turn off",
-        demonstration: "Demonstration: a drawn hand, not a camera",
+        demonstration: "Demonstration",
         asking: "Waiting for the camera…",
         shows: (gesture) => `Shows “${gesture}”`,
         showsNothing: "Between two gestures",
@@ -151,7 +152,6 @@ export const texts = Object.freeze({
         rateValue: (rate) => `${rate} a second`,
         answer: "Answer",
         nothing: "no gesture",
-        distance: (distance) => `distance ${distance}`,
         previewLabel: "Your picture, mirrored, with the hand that was found",
     },
 
@@ -199,13 +199,12 @@ export const texts = Object.freeze({
     },
 
     gestures: {
-        legend: "A longer bar is closer; past the mark it counts.",
+        legend: "Longer is closer; past the mark it counts.",
         empty: "No gesture is enrolled yet. Teach the first one.",
         loading: "Loading the gestures…",
         failed: "The gestures could not be loaded.",
         edit: (name) => `Change “${name}”`,
         match: "Recognised",
-        distanceLabel: (distance) => `distance ${distance}`,
         noDistance: "–",
     },
 
@@ -216,9 +215,7 @@ export const texts = Object.freeze({
         gripperOpen: (width) => `${width} mm open`,
         tool: "Tool",
         toolValue: (x, y, z) => `x ${x}  y ${y}  z ${z} cm`,
-        doing: "Doing",
-        nothing: "nothing",
-        loop: "Loop",
+        nothing: "at rest",
     },
 
     action: {

@@ -131,9 +131,13 @@ export class Capture {
         bitmap.close();
         try {
             const answer = await this.recognise(blob);
-            const match = answer && answer.match;
-            const accepted = match && match.gesture && match.accepted !== false;
-            const other = accepted && match.gesture !== this.ownName() ? match.gesture : null;
+            if (!answer.roi) {
+                item.classList.add("is-bad");
+                setText(verdict, answer.reason);
+                return;
+            }
+            const seen = answer.match && answer.match.gesture;
+            const other = seen && seen !== this.ownName() ? seen : null;
             item.classList.add("is-good");
             setText(verdict, other ? words.stillResembles(other) : words.stillGood);
             setText(this.note, other ? words.resembles(other) : "");

@@ -2,7 +2,7 @@
 
 import { texts } from "../texts/en.js";
 import { button, el, icon, part, setText, want } from "./dom.js";
-import { describeAction, short } from "./words.js";
+import { describeAction, number } from "./words.js";
 
 const words = texts.gestures;
 const STALE_MS = 600;
@@ -97,7 +97,7 @@ export function gestureList(element, store, { templateUrl }) {
             const share = known ? Math.min(1, Math.max(0, 1 - value / scale.end)) : 0;
             fill.style.transform = `scaleX(${share.toFixed(3)})`;
             mark.hidden = scale.mark === null || !fresh;
-            setText(distance, known ? short(value, 2) : words.noDistance);
+            setText(distance, known ? number(value, 2) : words.noDistance);
             item.classList.toggle("is-near", known && scale.mark !== null && share >= scale.mark);
             item.classList.toggle("is-match", name === matchName || name === held);
             item.classList.toggle("is-held", name === held);

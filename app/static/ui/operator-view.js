@@ -2,7 +2,7 @@
 
 import { texts } from "../texts/en.js";
 import { bitmapFromBase64, button, el, icon, part, setText, want } from "./dom.js";
-import { number, percent, short } from "./words.js";
+import { number, percent } from "./words.js";
 
 const words = texts.operator;
 const STALE_MS = 600;
@@ -240,7 +240,7 @@ export function operatorView(element, store) {
         setText(
             panel.found,
             match && match.gesture
-                ? `${match.gesture} · ${words.distance(short(match.distance, 2))}`
+                ? `${match.gesture}, ${number(match.distance, 2)}`
                 : frame ? words.nothing : "–",
         );
         const motion = frame && Number.isFinite(frame.motion) ? percent(frame.motion) : null;

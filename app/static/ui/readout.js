@@ -33,7 +33,7 @@ export function readout(element, store) {
         facts.append(el("div", {}, el("dt", { text: label }), value));
         return value;
     };
-    const doing = fact("doing", words.doing);
+    const doing = part(element, "doing");
     const gripper = fact("gripper", words.gripper);
     const tool = fact("tool", words.tool);
     let rows = [];
@@ -64,7 +64,7 @@ export function readout(element, store) {
         setText(doing, robot && robot.action ? describeAction(robot.action, description) : words.nothing);
         const width = robot && robot.gripper;
         setText(gripper, Number.isFinite(width) ? words.gripperOpen(number(width * 1000, 0)) : "–");
-        const position = robot && robot.tool_position;
+        const position = robot && robot.tool && robot.tool.position;
         tool.parentElement.hidden = !Array.isArray(position);
         if (Array.isArray(position)) {
             setText(tool, words.toolValue(...position.map((metres) => short(metres * 100, 0))));

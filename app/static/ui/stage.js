@@ -8,7 +8,7 @@ const CAMERAS = ["wrist", "scene"];
 
 /** One robot camera: draws pictures, shows their age. Opens nothing itself; it is given a feed. */
 class CameraView {
-    constructor(name, feed, enlarge) {
+    constructor(name, feed, { enlarge, swap }) {
         this.name = name;
         this.feed = feed;
         this.arrivedAt = 0;
@@ -25,6 +25,13 @@ class CameraView {
             "aria-label": texts.stage.enlarge(label),
             onclick: () => enlarge(name),
         });
+        const swapButton = button("", {
+            class: "round small swap",
+            "aria-label": texts.stage.swap,
+            title: texts.stage.swap,
+            iconName: "swap",
+            onclick: swap,
+        });
         this.element = el(
             "div",
             { class: "view is-empty", data: { view: name } },
@@ -32,6 +39,7 @@ class CameraView {
             this.empty,
             title,
             cover,
+            el("div", { class: "view-tools" }, swapButton),
         );
         this.context = this.canvas.getContext("2d");
         feed.addEventListener("picture", (event) => this.#draw(event.detail.bitmap));
@@ -86,7 +94,7 @@ class View3d {
         const label = texts.stage.views["3d"];
         this.note = el("p", { class: "view-empty" });
         this.big = button("", {
-            class: "round small",
+            class: "round small enlarge",
             "aria-label": texts.stage.enlarge(label),
             iconName: "enlarge",
             onclick: () => enlarge("3d"),
@@ -170,14 +178,16 @@ class View3d {
 
 /**
  * Fills `element`. `feeds` maps camera names to feeds; `onFrame(window)` is called with the 3D
- * frame's window, so that keys work in there; `memory` keeps small choices.
+ * frame's window, so that keys work in there; `memory` keeps small choices. Returns `swap`, which
+ * makes the other camera large.
  */
 export function stage(element, store, { feeds, onFrame, memory }) {
     const enlarge = (name) => {
         element.dataset.large = name;
         memory.set("large", name);
     };
-    const cameras = CAMERAS.map((name) => new CameraView(name, feeds[name], enlarge));
+    const swap = () => enlarge(element.dataset.large === "wrist" ? "scene" : "wrist");
+    const cameras = CAMERAS.map((name) => new CameraView(name, feeds[name], { enlarge, swap }));
     const hidden = memory.get("hide-3d") === "yes";
     const view3d = new View3d(enlarge, onFrame, hidden, (now) => {
         memory.set("hide-3d", now ? "yes" : "no");
@@ -224,8 +234,5 @@ export function stage(element, store, { feeds, onFrame, memory }) {
         session = now || session;
     });
 
-    return {
-        /** Make the other camera large. */
-        swap: () => enlarge(element.dataset.large === "wrist" ? "scene" : "wrist"),
-    };
+    return { swap };
 }

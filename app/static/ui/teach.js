@@ -99,7 +99,6 @@ export function teachContent({ gesture, store, video, grab, act, recognise, temp
             name,
             el("p", { class: "quiet", id: "teach-name-hint", text: words.nameHint }),
         ),
-        el("fieldset", {}, el("legend", { text: words.action }), form.element),
         el(
             "fieldset",
             {},
@@ -107,8 +106,8 @@ export function teachContent({ gesture, store, video, grab, act, recognise, temp
             gesture ? enrolled(gesture) : el("p", { class: "quiet", text: words.picturesHint }),
             capture.element,
         ),
-        problem,
-        row,
+        el("fieldset", {}, el("legend", { text: words.action }), form.element),
+        el("div", { class: "sheet-foot" }, problem, row),
     ];
     if (gesture) row.prepend(deletion());
 

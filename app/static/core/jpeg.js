@@ -1,0 +1,84 @@
+// Pictures of a <video> as JPEG bytes.
+
+const WIDEST = 640;
+const TALLEST = 720;
+
+/** The picture size to send for a video of this size: at most 640 wide, never enlarged. */
+export function sentSize(width, height) {
+    const scale = Math.min(1, WIDEST / width, TALLEST / height);
+    return [Math.max(1, Math.round(width * scale)), Math.max(1, Math.round(height * scale))];
+}
+
+/** Encodes one picture at a time, in a worker where the browser can, else on the page's thread. */
+export class JpegEncoder {
+    #worker = null;
+    #waiting = null;
+    #canvas = null;
+
+    constructor() {
+        if (typeof OffscreenCanvas !== "function" || typeof Worker !== "function") return;
+        try {
+            this.#worker = new Worker(new URL("./jpeg-worker.js", import.meta.url));
+        } catch {
+            return;
+        }
+        this.#worker.onmessage = ({ data }) => this.#answer(data);
+        this.#worker.onerror = (event) => {
+            event.preventDefault();
+            this.#answer({ error: "the worker did not load" });
+        };
+    }
+
+    /** The video's picture now as {jpeg: ArrayBuffer, width, height}; null before the first one. */
+    async encode(video, quality) {
+        if (!video.videoWidth || video.readyState < 2) return null;
+        const [width, height] = sentSize(video.videoWidth, video.videoHeight);
+        if (this.#worker) {
+            const bitmap = await createImageBitmap(video);
+            const answered = new Promise((resolve) => {
+                this.#waiting = resolve;
+            });
+            this.#worker.postMessage({ bitmap, width, height, quality }, [bitmap]);
+            const { jpeg } = await answered;
+            if (jpeg) return { jpeg, width, height };
+            this.#worker.terminate(); // this browser's workers cannot do it
+            this.#worker = null;
+        }
+        return { jpeg: await this.#encodeHere(video, width, height, quality), width, height };
+    }
+
+    close() {
+        if (this.#worker) this.#worker.terminate();
+        this.#worker = null;
+    }
+
+    #answer(data) {
+        const resolve = this.#waiting;
+        this.#waiting = null;
+        if (resolve) resolve(data);
+    }
+
+    async #encodeHere(video, width, height, quality) {
+        this.#canvas ||= document.createElement("canvas");
+        const canvas = this.#canvas;
+        if (canvas.width !== width) canvas.width = width;
+        if (canvas.height !== height) canvas.height = height;
+        canvas.getContext("2d", { alpha: false }).drawImage(video, 0, 0, width, height);
+        const blob = await new Promise((resolve) =>
+            canvas.toBlob(resolve, "image/jpeg", quality),
+        );
+        if (!blob) throw new Error("this browser cannot make JPEG pictures");
+        return blob.arrayBuffer();
+    }
+}
+
+/** One still of `video` as a JPEG Blob; null before the first picture. */
+export async function grabStill(video, quality = 0.92) {
+    const encoder = new JpegEncoder();
+    try {
+        const still = await encoder.encode(video, quality);
+        return still && new Blob([still.jpeg], { type: "image/jpeg" });
+    } finally {
+        encoder.close();
+    }
+}
