@@ -138,9 +138,13 @@ class MatchSettings(_Section):
     )
     cuts: tuple[float, ...] = Field(
         default=(1.0, 1.3, 1.7),
-        min_length=1,
         max_length=5,
-        description="palm radii; every template and every query is also tried cut here",
+        description="palm radii from the palm's centre; every query is tried cut at each of these",
+    )
+    trims: tuple[float, ...] = Field(
+        default=(0.0, 0.3),
+        max_length=5,
+        description="palm radii; every template is also tried with so much less wrist",
     )
     max_distance: float = Field(
         default=0.5,
@@ -223,6 +227,64 @@ class RobotSettings(_Section):
         default=None,
         description="Zenoh endpoint of a node that runs elsewhere; used when spawn is off",
     )
+
+
+class ArmMotionSettings(_Section):
+    """How a robot node moves its arm, in parts of the arm's own limits.
+
+    A stop uses the whole of them: what ordinary motion leaves is what a stop needs to end within
+    200 ms from any state (see ``app/robot/motion/limits.py``).
+    """
+
+    speed: float = Field(default=0.95, gt=0.0, le=0.95, description="part of the joint speeds")
+    acceleration: float = Field(
+        default=0.5, gt=0.0, le=0.5, description="part of the joint accelerations"
+    )
+    jerk: float = Field(default=0.5, gt=0.0, le=0.5, description="part of the joint jerks")
+    linear_speed: float = Field(
+        default=0.5, gt=0.0, le=1.0, description="m/s; fastest straight motion of the tool"
+    )
+    linear_acceleration: float = Field(default=1.5, gt=0.0, le=10.0, description="m/s^2")
+    angular_speed: float = Field(
+        default=1.5, gt=0.0, le=3.15, description="rad/s; fastest turn of the tool"
+    )
+    angular_acceleration: float = Field(default=5.0, gt=0.0, le=30.0, description="rad/s^2")
+    ramp_jerk_s: float = Field(
+        default=0.08,
+        gt=0.0,
+        le=1.0,
+        description="s from no acceleration to the whole of it, in straight motion",
+    )
+    slow_below: float = Field(
+        default=0.10,
+        gt=0.0,
+        le=1.0,
+        description="smallest singular value of the Jacobian below which straight motion slows",
+    )
+    following_error: float = Field(
+        default=0.15,
+        gt=0.0,
+        le=1.0,
+        description="rad between commanded and measured joint at which the arm counts as blocked",
+    )
+
+
+class NodeSettings(_Section):
+    """One robot node."""
+
+    id: str = Field(
+        default="puma", pattern=r"^[a-z0-9-]{1,32}$", description="name of the robot on the link"
+    )
+    model: str = Field(default="puma560", description="folder under app/robot/models")
+    endpoint: str = Field(description="Zenoh endpoint to listen on, unixsock-stream/PATH")
+    latch: Path | None = Field(
+        default=None, description="file that keeps the latched stop over a restart"
+    )
+    cameras: bool = Field(default=True, description="start the camera process, too")
+    exit_with_parent: bool = Field(
+        default=False, description="stop the arm and end when the starting process is gone"
+    )
+    motion: ArmMotionSettings = ArmMotionSettings()
 
 
 class GatewaySettings(_Section):

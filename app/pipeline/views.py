@@ -13,7 +13,7 @@ import numpy as np
 from app.config import MatchSettings
 from app.pipeline.palm import Palm, PalmFinder
 from app.pipeline.template import HEIGHT, WIDTH, resize_mask
-from app.pipeline.types import U8
+from app.pipeline.types import U8, WristCut
 from app.pipeline.wrist import cut_at, erase_arm
 
 SMALL = 80
@@ -33,6 +33,7 @@ class Views:
 
     def __init__(self, settings: MatchSettings) -> None:
         self._cuts = sorted(set(settings.cuts))
+        self._trims = sorted(set(settings.trims), reverse=True)
         self._turns = settings.turns
         half = settings.features == "distance"
         self.width, self.height = (WIDTH // 2, HEIGHT // 2) if half else (WIDTH, HEIGHT)
@@ -41,13 +42,17 @@ class Views:
 
     def of_template(self, template: U8) -> U8:
         """Views of an (80, 60) template, whose flattest side is taken for the wrist."""
-        return self(self._find_palm(np.ascontiguousarray(template, np.uint8)))
+        palm = self._find_palm(np.ascontiguousarray(template, np.uint8))
+        return self._vary(palm, [_trimmed(palm, radii) for radii in self._trims])
 
     def __call__(self, palm: Palm) -> U8:
         """Views of the hand in ``palm.piece``; at least one."""
+        return self._vary(palm, [cut_at(palm, radii) for radii in self._cuts])
+
+    def _vary(self, palm: Palm, cuts: list[WristCut | None]) -> U8:
         if not palm.found:
             return np.zeros((1, self.height, self.width), np.uint8)
-        cuts = [cut_at(palm, radii) for radii in self._cuts] or [None]
+        cuts = cuts or [None]
         views: list[U8] = []
         seen: set[int | None] = set()
         # Shrinking comes first and once, with the longest piece of arm that any view keeps.
@@ -93,3 +98,13 @@ class Views:
         if width == 0 or height == 0:
             return np.zeros((self.height, self.width), np.uint8)
         return resize_mask(turned[y : y + height, x : x + width], self.width, self.height)
+
+
+def _trimmed(palm: Palm, radii: float) -> WristCut | None:
+    """A cut so many palm radii inwards from the side where a template's wrist is."""
+    if palm.arm is None:
+        return None
+    height, width = palm.piece.shape
+    inwards = round(radii * palm.radius)
+    at = {"bottom": height - inwards, "top": inwards, "left": inwards, "right": width - inwards}
+    return WristCut(palm.arm, at[palm.arm])
