@@ -1,0 +1,1 @@
+"""From actions to joint motion that is smooth and within every limit."""

@@ -1,0 +1,33 @@
+"""What all motions have in common."""
+
+from typing import Protocol
+
+from app.robot.arm import Reading
+from app.robot.motion.trajectory import JointTrajectory
+
+
+class Task(Protocol):
+    """One action being done. Begins with the arm at rest; ``step`` is called once a cycle.
+
+    A task that ends leaves the arm at rest. In a stop, it just stops being called.
+    """
+
+    limits: tuple[str, ...]
+    """Limits at work, in plain words."""
+
+    def step(self, trajectory: JointTrajectory, reading: Reading) -> bool:
+        """Move ``trajectory`` on by one step.
+
+        Returns:
+            Whether the task has ended.
+        """
+        ...
+
+    def release(self) -> bool:
+        """The gesture was let go.
+
+        Returns:
+            True: the task brings the arm to rest itself and then ends; go on calling ``step``.
+            False: do not call ``step`` any more; the caller brakes.
+        """
+        ...
