@@ -148,6 +148,9 @@ function greeted() {
     describedAt = -Infinity;
     describeRobot();
     loadGestures();
+    // Somebody pressed STOP and nobody heard: say it again, first of all.
+    if (stopper.state === "failed") stopper.stop();
+    for (const feed of Object.values(feeds)) feed.retryNow();
 }
 
 function refused(message) {

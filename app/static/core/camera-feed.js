@@ -33,6 +33,11 @@ export class CameraFeed extends EventTarget {
         this.#socket.open();
     }
 
+    /** Try now, without waiting for the back-off. */
+    retryNow() {
+        this.#socket.retryNow();
+    }
+
     close() {
         this.#newest = null;
         this.#socket.close();

@@ -20,11 +20,12 @@ export class Capture {
     #run = 0;
     #counting = false;
 
-    constructor({ video, store, grab, recognise, ownName }) {
+    constructor({ video, store, grab, recognise, ownName, onTaken }) {
         this.store = store;
         this.grab = grab;
         this.recognise = recognise;
         this.ownName = ownName;
+        this.onTaken = onTaken;
         this.video = video;
         this.entries = [];
         this.preview = el("canvas", { class: "capture-preview", "aria-hidden": "true" });
@@ -123,6 +124,7 @@ export class Capture {
             this.#draw();
         });
         this.entries.push(entry);
+        this.onTaken();
         this.#draw();
         const bitmap = await createImageBitmap(blob);
         const scale = Math.min(96 / bitmap.width, 72 / bitmap.height);

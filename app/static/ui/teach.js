@@ -34,6 +34,7 @@ export function teachContent({ gesture, store, video, grab, act, recognise, temp
         grab,
         recognise,
         ownName: () => (gesture ? gesture.name : null),
+        onTaken: () => setText(problem, ""),
     });
     const problem = el("p", { class: "problem-line", role: "alert", id: "teach-problem" });
     const save = button(gesture ? words.saveChanges : words.save, {
