@@ -1,0 +1,57 @@
+"""A real browser that drives: Chromium, the page, a fake webcam that plays the drawn hand."""
+
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import psutil
+from playwright.sync_api import Page, sync_playwright
+
+from app.gestures.synthetic import Step, SyntheticOperator, write_mjpeg
+from tests.e2e.running import BASE_ARGUMENTS, Server
+
+
+def webcam(script: Sequence[Step], path: Path) -> Path:
+    """Write what the fake webcam plays, over and over."""
+    write_mjpeg(SyntheticOperator(script).frames(), path)
+    return path
+
+
+@contextmanager
+def browser(server: Server, video: Path, *, view_3d: bool = False) -> Iterator[Page]:
+    """A page that is signed in, has its camera on and the robot armed."""
+    executable = shutil.which("chromium")
+    if executable is None:
+        raise RuntimeError("no Chromium on this machine (Debian: apt-get install chromium)")
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(
+            executable_path=executable,
+            args=[
+                *BASE_ARGUMENTS,
+                "--use-fake-ui-for-media-stream",
+                f"--use-file-for-fake-video-capture={video}",
+            ],
+        )
+        page = chromium.new_page(viewport={"width": 1280, "height": 800})
+        page.add_init_script(
+            f"localStorage.setItem('farhand-hide-3d', '{'no' if view_3d else 'yes'}')"
+        )
+        page.goto(server.link)
+        page.wait_for_function("window.farhand?.robot?.mode === 'disarmed'", timeout=60_000)
+        page.click("#btn-start")
+        page.wait_for_function("window.farhand.frame !== null", timeout=20_000)
+        page.click("#btn-control")
+        page.wait_for_function("window.farhand.robot.controller === window.farhand.hello.session")
+        page.click("#btn-arm")
+        page.wait_for_function("window.farhand.robot.armed")
+        yield page
+        if chromium.is_connected():
+            chromium.close()
+
+
+def kill_browser() -> None:
+    """Kill every Chromium that this process started, at once and without a word."""
+    for child in psutil.Process().children(recursive=True):
+        if "chrom" in child.name():
+            child.kill()
