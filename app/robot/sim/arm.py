@@ -12,7 +12,6 @@ from app.robot.sim.world import (
     add_floor,
     add_object,
     connect,
-    disconnect,
     load_robot,
 )
 
@@ -54,6 +53,7 @@ class SimulatedArm:
             assets.urdf_path, self.model.base_link, self.model.tool_link
         )
         self.client = connect()
+        self._open = True
         pybullet.setGravity(0, 0, -9.81, physicsClientId=self.client)
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=1 / STEPS_PER_SECOND,
@@ -166,7 +166,9 @@ class SimulatedArm:
 
     def close(self) -> None:
         """Give the Bullet world back. Closing twice does no harm."""
-        disconnect([self.client])
+        if self._open:
+            self._open = False
+            pybullet.disconnect(self.client)
 
     def _angles(self) -> tuple[Vector, Vector]:
         states = pybullet.getJointStates(self.body, self._joints, physicsClientId=self.client)

@@ -40,6 +40,7 @@ class Stage:
         prepare: Callable[[int], None] = lambda client: None,
     ) -> None:
         self.client = connect()
+        self._open = True
         prepare(self.client)
         self.body, self._joints, self.links = _load_visuals(self.client, assets, links)
         self._driven = [self._joints[joint.name] for joint in assets.model.joints]
@@ -75,8 +76,9 @@ class Stage:
         return [next(moved) if link >= 0 else np.eye(4) for link in links]
 
     def close(self) -> None:
-        """Give the world back."""
-        if pybullet.isConnected(self.client):
+        """Give the world back. Closing twice does no harm."""
+        if self._open:
+            self._open = False
             pybullet.disconnect(self.client)
 
 

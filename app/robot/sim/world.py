@@ -5,7 +5,6 @@ The only module that starts PyBullet; :mod:`app.robot.sim.arm` (physics) and
 """
 
 import math
-from collections.abc import Iterable
 from pathlib import Path
 
 import pybullet
@@ -107,10 +106,3 @@ def add_object(client: int, thing: ObjectModel) -> int:
 def upright(turn: float) -> tuple[float, float, float, float]:
     """A turn about Z as Bullet's quaternion x, y, z, w."""
     return 0.0, 0.0, math.sin(turn / 2), math.cos(turn / 2)
-
-
-def disconnect(clients: Iterable[int]) -> None:
-    """Give worlds back; those that are gone already are passed over."""
-    for client in clients:
-        if pybullet.isConnected(client):
-            pybullet.disconnect(client)
