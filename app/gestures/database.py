@@ -41,15 +41,15 @@ def open_engine(url: str | URL) -> Engine:
             return create_engine(parsed, pool_pre_ping=True)
         _check_place(parsed)
         engine = create_engine(parsed, connect_args={"timeout": BUSY_S})
-    except ArgumentError as error:
-        raise CannotStart(
-            f"the database URL is not one ({_one_line(error)}); "
-            "it should look like sqlite:///farhand.db or postgresql+psycopg://user@host/name"
-        ) from error
     except (NoSuchModuleError, ModuleNotFoundError) as error:
         raise CannotStart(
             f"the driver for the database URL is missing ({_one_line(error)}); "
             "install it, or leave the URL out to use SQLite"
+        ) from error
+    except ArgumentError as error:
+        raise CannotStart(
+            f"the database URL is not one ({_one_line(error)}); "
+            "it should look like sqlite:///farhand.db or postgresql+psycopg://user@host/name"
         ) from error
     _set_up_sqlite(engine)
     return engine

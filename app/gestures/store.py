@@ -198,12 +198,13 @@ class GestureStore:
         self, session: Session, entries: Sequence[NewGesture], *, replace: bool
     ) -> builtins.list[Gesture]:
         rows = []
+        now = _now_ms()
         for entry in entries:
             row = session.scalar(
                 select(GestureRow).where(GestureRow.name_key == name_key(entry.name))
             )
             if row is None:
-                row = GestureRow(id=uuid.uuid4().hex, created_ms=_now_ms(), samples=[])
+                row = GestureRow(id=uuid.uuid4().hex, created_ms=now, samples=[])
                 session.add(row)
             elif not replace:
                 self._check_free(session, entry.name)
@@ -211,7 +212,7 @@ class GestureStore:
             row.action = ACTION.dump_json(entry.action).decode()
             row.samples.clear()
             self._append(row, entry.templates)
-            row.updated_ms = _now_ms()
+            row.updated_ms = now
             row.checksum = _gesture_checksum(row)
             session.flush()
             rows.append(row)
