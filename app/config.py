@@ -147,23 +147,27 @@ class MatchSettings(_Section):
         description="palm radii; every template is also tried with so much less wrist",
     )
     max_distance: float = Field(
-        default=0.5,
+        default=0.34,
         ge=0.0,
         le=2.0,
-        description="farthest accepted match, root mean square over the features; calibration on "
-        "the enrolled templates can only lower it",
+        description="farthest accepted match, root mean square over the features",
     )
     calibrate: bool = Field(
-        default=True, description="lower max_distance by how far apart the enrolled gestures are"
+        default=True,
+        description="lower max_distance, down to min_reach, by how far apart the enrolled "
+        "templates are",
+    )
+    min_reach: float = Field(
+        default=0.24, ge=0.0, le=2.0, description="a match as near as this is never too far"
     )
     min_margin: float = Field(
-        default=0.02,
+        default=0.03,
         ge=0.0,
         le=2.0,
         description="least lead over the second gesture, in the unit of the distance",
     )
     max_error: float = Field(
-        default=0.6,
+        default=0.3,
         ge=0.0,
         le=2.0,
         description="largest reconstruction error accepted, in the unit of the distance",

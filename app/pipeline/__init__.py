@@ -1,9 +1,7 @@
 """From bytes to gestures: one stage a file, their order in :mod:`app.pipeline.pipeline`."""
 
-from app.pipeline.evaluate import evaluate
 from app.pipeline.match import Gallery, PcaMatcher
 from app.pipeline.pipeline import STAGES, Pipeline
-from app.pipeline.replay import replay
 from app.pipeline.still import extract_template
 from app.pipeline.template import pack_template, unpack_template
 from app.pipeline.types import Extraction, FrameResult, GestureEvent, Match, WristCut
@@ -18,9 +16,7 @@ __all__ = [
     "PcaMatcher",
     "Pipeline",
     "WristCut",
-    "evaluate",
     "extract_template",
     "pack_template",
-    "replay",
     "unpack_template",
 ]

@@ -13,6 +13,11 @@ from app.pipeline.template import HEIGHT, WIDTH
 from app.pipeline.types import F32, U8, Match
 from app.pipeline.views import Views
 
+OWN_REACH = 1.1
+OTHER_REACH = 0.9
+"""Factors of the calibration, measured on the digit signs (benchmarks/recognition.py)."""
+MAX_CALIBRATED = 200
+"""Templates that are held against the others to calibrate; more are thinned evenly."""
 MAX_FITTED = 2000
 """Views that the principal components are computed from; more are thinned evenly."""
 
@@ -97,19 +102,38 @@ class PcaMatcher:
         self._basis = _principal(rows, self.settings.components)
         self._rows = self._coordinates(rows)
         self._squares: F32 = np.einsum("ij,ij->i", self._rows, self._rows)
-        of_row = np.array([self.labels.index(labels[i]) for i in owner])
+        of_template = np.array([self.labels.index(label) for label in labels])
+        of_row = of_template[owner]
         self._starts: NDArray[np.intp] = np.flatnonzero(np.r_[True, of_row[1:] != of_row[:-1]])
-        if self.settings.calibrate and len(self.labels) > 1:
-            self.max_distance = min(self.max_distance, self._calibrated(owner))
+        if self.settings.calibrate:
+            self.max_distance = self._calibrated(owner, of_template)
 
-    def _calibrated(self, owner: NDArray[np.intp]) -> float:
-        """How far apart the enrolled gestures are: the median distance to the nearest other one."""
-        first = np.flatnonzero(np.r_[True, owner[1:] != owner[:-1]])
-        # One view a template, the untouched one, is compared with all views of all others.
-        to_labels = self._to_labels(self._rows[first + len(self.settings.turns) // 2])
-        own = np.searchsorted(self._starts, first, side="right") - 1
-        to_labels[np.arange(len(first)), own] = np.inf
-        return float(np.median(to_labels.min(axis=1)))
+    def _calibrated(self, owner: NDArray[np.intp], of_template: NDArray[np.intp]) -> float:
+        """The largest distance accepted, from how the enrolled templates lie to one another.
+
+        With several templates a gesture: a little more than the distance at which nine out of ten
+        find another of their own. With one each: a little less than the median distance to the
+        nearest other gesture. Within the bounds of the settings, and in their middle when a single
+        template says nothing.
+        """
+        low, high = self.settings.min_reach, self.settings.max_distance
+        count = len(of_template)
+        asked = np.unique(np.linspace(0, count - 1, min(count, MAX_CALIBRATED)).astype(np.intp))
+        own_to, other_to = [], []
+        for template in asked:
+            table = self._squared(self._rows[owner == template]).min(axis=0) / self._dimensions
+            same = of_template[owner] == of_template[template]
+            other_to.append(table[~same].min(initial=np.inf))
+            own_to.append(table[same & (owner != template)].min(initial=np.inf))
+        own, other = np.sqrt(own_to), np.sqrt(other_to)
+        own, other = own[np.isfinite(own)], other[np.isfinite(other)]
+        if len(own) >= 2:
+            reach = OWN_REACH * float(np.quantile(own, 0.9))
+        elif len(other):
+            reach = OTHER_REACH * float(np.median(other))
+        else:
+            reach = (low + high) / 2
+        return min(max(reach, min(low, high)), high)
 
     def _coordinates(self, centred: F32) -> F32:
         """(v, d) centred features to (v, k + 1): components, then the reconstruction error."""
@@ -119,15 +143,19 @@ class PcaMatcher:
         error = np.sqrt(np.maximum(total - within, 0))
         return np.concatenate([inside, error[:, None]], axis=1)
 
-    def _to_labels(self, points: F32) -> F32:
-        """(v, k + 1) coordinates to (v, labels) distances."""
-        squares = np.einsum("ij,ij->i", points, points)
-        table = points @ self._rows.T
+    def _squared(self, points: F32) -> F32:
+        """(v, k + 1) coordinates to (v, enrolled views) squared distances."""
+        table: F32 = points @ self._rows.T
         table *= -2
         table += self._squares
-        nearest: F32 = np.minimum.reduceat(table, self._starts, axis=1)
-        nearest += squares[:, None]
-        distances: F32 = np.sqrt(np.maximum(nearest, 0) / self._dimensions)
+        table += np.einsum("ij,ij->i", points, points)[:, None]
+        np.maximum(table, 0, out=table)
+        return table
+
+    def _to_labels(self, points: F32) -> F32:
+        """(v, k + 1) coordinates to (v, labels) distances."""
+        nearest = np.minimum.reduceat(self._squared(points), self._starts, axis=1)
+        distances: F32 = np.sqrt(nearest / self._dimensions)
         return distances
 
     def __call__(self, views: U8) -> Matched:
