@@ -91,6 +91,14 @@ async def operator_clip(request: Request) -> FileResponse:
     )
 
 
+@router.get("/api/synthetic/operator.json", tags=["server"], summary="What the operator shows")
+async def operator_captions() -> list[dict[str, Any]]:
+    """When which gesture is held still in the video: ``[{"start_s", "end_s", "gesture"}]``."""
+    from app.gestures.synthetic import operator_captions as captions
+
+    return [caption._asdict() for caption in await asyncio.to_thread(captions)]
+
+
 def _make_clip(path: Path) -> None:
     """Write the clip beside ``path`` and move it there whole."""
     from app.gestures.synthetic import operator_clip

@@ -211,6 +211,25 @@ setInterval(() => {
     store.set({ sender: { latencyMs, rate, width, height } });
 }, 250);
 
+let captions = null;
+
+/** What the synthetic operator shows now; undefined while that is not known. */
+async function captionClip() {
+    if (store.state.source.kind !== "synthetic" || store.state.source.state !== "running") return;
+    if (!captions) {
+        captions = [];
+        try {
+            captions = await api.operatorCaptions();
+        } catch {
+            // Then there are no captions.
+        }
+    }
+    const now = video.currentTime;
+    const shown = captions.find(({ start_s, end_s }) => start_s <= now && now < end_s);
+    store.set({ clipGesture: captions.length ? (shown ? shown.gesture : null) : undefined });
+}
+setInterval(captionClip, 150);
+
 // What the person wants
 
 let releasing = false;
@@ -255,7 +274,8 @@ async function chooseSource(wanted) {
     await source.start(wanted);
     const { robot } = store.state;
     // "Start driving" goes on by itself as far as nothing can move yet.
-    if (starting && store.state.source.state === "running" && robot && !robot.controller) {
+    const free = robot && !robot.fault && !robot.controller;
+    if (starting && free && store.state.source.state === "running") {
         takeControl();
     }
 }

@@ -50,6 +50,8 @@ export const api = Object.freeze({
     stopRobot: (robot, timeoutMs) =>
         request("POST", `api/robots/${id(robot)}/stop`, { timeoutMs }),
     resetRobot: (robot) => request("POST", `api/robots/${id(robot)}/reset`),
+    /** When which gesture is shown by the synthetic operator: [{start_s, end_s, gesture}]. */
+    operatorCaptions: () => request("GET", "api/synthetic/operator.json"),
     gestures: () => request("GET", "api/gestures"),
     createGesture(name, action, images) {
         const form = imageForm(images);

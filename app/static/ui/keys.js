@@ -12,7 +12,7 @@ const LETTERS = { a: "toggle-arm", c: "toggle-control", w: "swap", "?": "help" }
 export function keys(root, { closeSheet, canMove }) {
     let swallowed = false;
 
-    function down(event) {
+    function down(event, stopOnly = false) {
         if (event.ctrlKey || event.metaKey || event.altKey || event.isComposing) return;
         const typing = isField(event.target);
         if (event.key === "Escape") {
@@ -27,7 +27,7 @@ export function keys(root, { closeSheet, canMove }) {
             event.preventDefault(); // neither scrolls nor presses what has the focus
             swallowed = true;
             if (!event.repeat) want(root, "stop");
-        } else if (!typing && !event.repeat && LETTERS[event.key.toLowerCase()]) {
+        } else if (!stopOnly && !typing && !event.repeat && LETTERS[event.key.toLowerCase()]) {
             want(root, LETTERS[event.key.toLowerCase()]);
         }
     }
@@ -37,11 +37,14 @@ export function keys(root, { closeSheet, canMove }) {
         if (event.key === " ") swallowed = false;
     }
 
-    function listen(target) {
-        target.addEventListener("keydown", down, true);
-        target.addEventListener("keyup", up, true);
-    }
+    window.addEventListener("keydown", down, true);
+    window.addEventListener("keyup", up, true);
 
-    listen(window);
-    return { listen };
+    return {
+        /** Let the stop keys work in a frame too; its letters move the camera there. */
+        listen(frame) {
+            frame.addEventListener("keydown", (event) => down(event, true), true);
+            frame.addEventListener("keyup", up, true);
+        },
+    };
 }

@@ -7,7 +7,7 @@ import { number, percent } from "./words.js";
 const words = texts.operator;
 const STALE_MS = 600;
 
-/** The box, the mask's tint and the corners, drawn over the video in the frame's own pixels. */
+/** The box and the mask's shade, drawn over the video in the frame's own pixels. */
 class Overlay {
     constructor(canvas) {
         this.canvas = canvas;
@@ -25,10 +25,10 @@ class Overlay {
         const context = tint.getContext("2d", { willReadFrequently: true });
         context.drawImage(bitmap, 0, 0);
         bitmap.close();
-        // White is hand: turn brightness into opacity, then colour what is left.
+        // White is hand: what is not hand is shaded, so that the hand keeps its own colours.
         const pixels = context.getImageData(0, 0, tint.width, tint.height);
         for (let at = 0; at < pixels.data.length; at += 4) {
-            pixels.data[at + 3] = pixels.data[at] > 127 ? 255 : 0;
+            pixels.data[at + 3] = 255 - pixels.data[at];
         }
         context.putImageData(pixels, 0, 0);
         context.globalCompositeOperation = "source-in";
@@ -44,12 +44,12 @@ class Overlay {
             canvas.height = height;
         }
         context.clearRect(0, 0, width, height);
+        if (!Array.isArray(roi) || roi.length !== 4) return;
         if (this.mask) {
-            context.globalAlpha = 0.3;
+            context.globalAlpha = 0.55;
             context.drawImage(this.tint, 0, 0, width, height);
             context.globalAlpha = 1;
         }
-        if (!Array.isArray(roi) || roi.length !== 4) return;
         const [x, y, w, h] = roi;
         context.strokeStyle = "rgba(0, 0, 0, 0.55)";
         context.lineWidth = recognised ? 9 : 6;

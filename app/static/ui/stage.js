@@ -144,7 +144,7 @@ class View3d {
         setText(this.note, texts.stage.loading3d);
         this.frame = el("iframe", {
             title: texts.stage.views["3d"],
-            src: "viser/",
+            src: "viser/?fixedDpr=1", // one point a pixel: software WebGL has no speed to spare
             onload: () => this.#loaded(),
         });
         this.element.prepend(this.frame);
@@ -160,6 +160,12 @@ class View3d {
             const inner = this.frame.contentWindow;
             const kind = inner.document.contentType;
             if (kind !== "text/html") throw new Error("not a page");
+            // The scene alone: no panels, no hints meant for viser's own page.
+            const quiet = new inner.CSSStyleSheet();
+            quiet.replaceSync(
+                ".mantine-Notifications-root, .mantine-Paper-root { display: none !important; }",
+            );
+            inner.document.adoptedStyleSheets = [quiet];
             this.element.classList.remove("is-empty");
             this.onFrame(inner);
         } catch {
