@@ -21,8 +21,8 @@ TABLE_SCALE = 500
 _FLOOR_SCALE = 100
 _FLOOR_EDGE = 6.0
 """m; the floor's texture is a square of this edge round the robot's base."""
-WALL_TOP = (214, 220, 226)
-WALL_LOW = (176, 184, 194)
+WALL_TOP = (226, 231, 236)
+WALL_LOW = (184, 192, 202)
 FLOOR = (128, 134, 142)
 """RGB."""
 
@@ -69,7 +69,7 @@ class Backdrop:
     def draw(self, view: Matrix) -> Room:
         """The room as seen with the 4x4 view matrix ``view``."""
         size = (self._lens.height, self._lens.width)
-        colour, depth = self._wall(view[:3, 2]), np.ones(size, np.float32)
+        colour, depth = self._wall(view), np.ones(size, np.float32)
         table, to_table = np.zeros(size, np.uint8), None
         half = _FLOOR_EDGE / 2
         self._paint(colour, depth, view, np.array([-half, -half, 0.0]), self._floor, _FLOOR_SCALE)
@@ -119,13 +119,12 @@ class Backdrop:
         cv2.copyTo(away, mask, depth)
         return mask, plane.to_plane
 
-    def _wall(self, up: Matrix) -> Picture:
-        """A wall that darkens towards the floor, along ``up`` as the camera sees it."""
-        lens = self._lens
-        across = affine(np.array([up[0], -up[1], 0.0]), self._columns, self._rows)
-        across = np.clip(0.5 + (across - across.mean()) / lens.height, 0.0, 1.0)
+    def _wall(self, view: Matrix) -> Picture:
+        """A wall that grows lighter upwards from where the floor fades into it."""
+        rise = affine(self._lens.rise(view), self._columns, self._rows)
+        light = np.clip((rise + 0.22) * 1.3, 0.0, 1.0)  # the floor ends a little below the horizon
         low, top = np.array(WALL_LOW, np.float32), np.array(WALL_TOP, np.float32)
-        return np.asarray((low + across[:, :, None] * (top - low)).astype(np.uint8))
+        return np.asarray((low + light[:, :, None] * (top - low)).astype(np.uint8))
 
 
 def shade(room: Room, shadow: Picture, scale: float) -> Picture:

@@ -31,13 +31,24 @@ class Lens:
         fov_degrees: Vertical field of view.
         near: m; nothing nearer is drawn.
         far: m; nothing farther is drawn.
+        middle: Whether the renderer samples pixels in their middle, as OpenGL does. TinyRenderer
+            samples pixel (column, row), counted from the top, at (2 column / width - 1,
+            1 - 2 (row + 1) / height); found by comparing depths.
     """
 
     def __init__(
-        self, width: int, height: int, fov_degrees: float, near: float, far: float
+        self,
+        width: int,
+        height: int,
+        fov_degrees: float,
+        near: float,
+        far: float,
+        *,
+        middle: bool = False,
     ) -> None:
         self.width, self.height = width, height
         f = 1.0 / math.tan(math.radians(fov_degrees) / 2)
+        self._half = np.array([width / height / f, 1 / f])
         self.projection = np.array(
             [
                 [f * height / width, 0.0, 0.0, 0.0],
@@ -46,10 +57,13 @@ class Lens:
                 [0.0, 0.0, -1.0, 0.0],
             ]
         )
-        # TinyRenderer samples pixel (column, row) of the picture, counted from the top, at
-        # (2 column / width - 1, 1 - 2 (row + 1) / height); found by comparing depths.
+        right, down = (0.5, 0.5) if middle else (0.0, 1.0)
         self._to_ndc = np.array(
-            [[2 / width, 0.0, -1.0], [0.0, -2 / height, 1 - 2 / height], [0.0, 0.0, 1.0]]
+            [
+                [2 / width, 0.0, 2 * right / width - 1],
+                [0.0, -2 / height, 1 - 2 * down / height],
+                [0.0, 0.0, 1.0],
+            ]
         )
 
     def plane(self, view: Matrix, origin: Matrix, first: Matrix, second: Matrix) -> PlaneView:
@@ -66,6 +80,17 @@ class Lens:
         depth = onto[2] @ back / 2
         depth[2] += 0.5  # from -1..1 to the buffer's 0..1
         return PlaneView(back, depth, back[2])
+
+    def rise(self, view: Matrix) -> Matrix:
+        """How much the ray through (column, row, 1) rises, in m per metre ahead; 0 at the horizon.
+
+        Returns:
+            The coefficients, shape (3,).
+        """
+        right, above, back = view[:3, 2]  # the world's up in the camera's axes
+        x, y = self._half
+        ahead = np.array([0.0, 0.0, back])
+        return np.asarray(right * x * self._to_ndc[0] + above * y * self._to_ndc[1] - ahead)
 
 
 def look_at(eye: Matrix, target: Matrix, up: Matrix) -> Matrix:

@@ -46,8 +46,12 @@ class Renderer:
         assets = model_assets(model)
         self.model = assets.model
         self._draw_with = _Painter(has_graphics_card() if hardware is None else hardware)
+        # One world for all cameras on a graphics card: two EGL worlds in a process draw into each
+        # other, and a card needs none of the savings below.
+        whole = self._draw_with.stage(assets, self.model.objects) if self.hardware else None
         self._views = {
-            camera.name: _View(assets, camera, self._draw_with) for camera in self.model.cameras
+            camera.name: _View(assets, camera, self._draw_with, whole)
+            for camera in self.model.cameras
         }
         table = next((thing for thing in self.model.objects if thing.grid), None)
         self._shadow = Shadow(table, np.array(self.model.cameras[0].light)) if table else None
@@ -117,32 +121,37 @@ class Renderer:
 
 
 class _View:
-    """One camera, and the world it looks at."""
+    """One camera, and the world it looks at: its own, or ``whole`` with everything in it."""
 
-    def __init__(self, assets: ModelAssets, camera: CameraModel, painter: "_Painter") -> None:
+    def __init__(
+        self,
+        assets: ModelAssets,
+        camera: CameraModel,
+        painter: "_Painter",
+        whole: Stage | None,
+    ) -> None:
         model = assets.model
         self._camera, self._painter = camera, painter
-        self._lens = Lens(camera.width, camera.height, camera.fov_degrees, camera.near, camera.far)
+        self._lens = self._painter.lens(camera)
         fixed = [thing for thing in model.objects if thing.mass == 0]
         loose = [thing for thing in model.objects if thing.mass > 0]
         table = next((thing for thing in model.objects if thing.grid), None)
         self._backdrop = Backdrop(self._lens, table, fixed)
-        stands_still = camera.link == model.base_link
         self._still: Room | None = None
         self._view = np.eye(4)
+        base = model.base_link
+        stands_still = camera.link == base and whole is None
         if stands_still:
             self._view = self._looks_from(np.eye(4))
-            stage = Stage(assets, lambda link: link == model.base_link, fixed, painter.prepare)
+            stage = Stage(assets, lambda link: link == base, fixed)
             self._still = self._draw_still(stage, table, fixed)
             stage.close()
-        self.stage = Stage(
+        self.stage = whole or Stage(
             assets,
             lambda link: (
-                (not camera.shows or link in camera.shows)
-                and not (stands_still and link == model.base_link)
+                (not camera.shows or link in camera.shows) and not (stands_still and link == base)
             ),
             loose if stands_still else fixed + loose,
-            painter.prepare,
         )
         self._link = self.stage.links[camera.link]
 
@@ -164,9 +173,7 @@ class _View:
     ) -> Room:
         """What never moves, drawn once: at twice the size, so that its edges come out smooth."""
         camera = self._camera
-        fine = Lens(
-            2 * camera.width, 2 * camera.height, camera.fov_degrees, camera.near, camera.far
-        )
+        fine = self._painter.lens(camera, 2)
         room = Backdrop(fine, table, fixed).draw(self._view)
         room = self._painter.add(room, stage, fine, self._view, camera.light)
         size = (camera.width, camera.height)
@@ -194,10 +201,22 @@ class _Painter:
         self.hardware = hardware
         self._with = pybullet.ER_BULLET_HARDWARE_OPENGL if hardware else pybullet.ER_TINY_RENDERER
 
-    def prepare(self, client: int) -> None:
-        """Give a new world its renderer, before anything is in it."""
-        if not self.hardware:
-            return
+    def lens(self, camera: CameraModel, times: int = 1) -> Lens:
+        """The camera's lens, for a picture ``times`` as large."""
+        return Lens(
+            camera.width * times,
+            camera.height * times,
+            camera.fov_degrees,
+            camera.near,
+            camera.far,
+            middle=self.hardware,
+        )
+
+    def stage(self, assets: ModelAssets, things: Iterable[ObjectModel]) -> Stage:
+        """A world with everything in it, drawn by the graphics card."""
+        return Stage(assets, lambda link: True, things, self._load_egl, own_shapes=False)
+
+    def _load_egl(self, client: int) -> None:
         plugin = find_spec("eglRenderer")
         loaded = -1
         if plugin is not None and plugin.origin is not None:

@@ -30,6 +30,7 @@ class Stage:
         links: Says, by a link's name, whether it is drawn.
         things: Objects to draw.
         prepare: Called with the new world's client before anything is loaded.
+        own_shapes: Whether the renderer draws shapes given as triangles; EGL does not.
     """
 
     def __init__(
@@ -38,6 +39,7 @@ class Stage:
         links: Callable[[str], bool],
         things: Iterable[ObjectModel],
         prepare: Callable[[int], None] = lambda client: None,
+        own_shapes: bool = True,
     ) -> None:
         self.client = connect()
         self._open = True
@@ -45,7 +47,7 @@ class Stage:
         self.body, self._joints, self.links = _load_visuals(self.client, assets, links)
         self._driven = [self._joints[joint.name] for joint in assets.model.joints]
         self._fingers = [self._joints[name] for name in assets.model.gripper.fingers]
-        self.things = {thing.name: add_visual(self.client, thing) for thing in things}
+        self.things = {thing.name: add_visual(self.client, thing, own_shapes) for thing in things}
 
     def pose(self, joints: Iterable[float], gripper: float) -> None:
         """Put the robot's joints (rad) and its fingers (m between them) somewhere."""
@@ -82,7 +84,7 @@ class Stage:
             pybullet.disconnect(self.client)
 
 
-def add_visual(client: int, thing: ObjectModel) -> int:
+def add_visual(client: int, thing: ObjectModel, own_shapes: bool = True) -> int:
     """Put one thing into a world for pictures; returns its body id.
 
     Of a thing with a grid only the sides: its top is drawn by the backdrop.
@@ -102,6 +104,14 @@ def add_visual(client: int, thing: ObjectModel) -> int:
         shapes = pybullet.createVisualShape(
             pybullet.GEOM_BOX,
             halfExtents=[edge / 2 for edge in thing.size],
+            rgbaColor=thing.colour,
+            physicsClientId=client,
+        )
+    elif not own_shapes:
+        shapes = pybullet.createVisualShape(
+            pybullet.GEOM_CYLINDER,
+            radius=thing.size[0] / 2,
+            length=thing.size[2],
             rgbaColor=thing.colour,
             physicsClientId=client,
         )

@@ -1,5 +1,8 @@
 import math
+import subprocess
+import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pybullet
@@ -142,6 +145,34 @@ def test_hardware_that_is_not_there_is_refused(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("app.robot.sim.renderer.find_spec", lambda name: None)
     with pytest.raises(CannotStart, match="EGL renderer cannot be loaded"):
         Renderer(hardware=True)
+
+
+def test_the_horizon_is_where_it_should_be() -> None:
+    lens = Lens(320, 240, 40.0, 0.2, 5.0, middle=True)
+    level = look_at(np.array([0, 0, 1.0]), np.array([1.0, 0, 1.0]), np.array([0, 0, 1.0]))
+    assert lens.rise(level) @ [159.5, 119.5, 1] == pytest.approx(0)
+    assert lens.rise(level) @ [10, -0.5, 1] == pytest.approx(math.tan(math.radians(20)))
+    turned = look_at(np.array([0, 0, 1.0]), np.array([1.0, 0, 1.0]), np.array([0, 1.0, 0]))
+    assert lens.rise(turned) @ [159.5, 7, 1] == pytest.approx(0)
+    assert lens.rise(turned) @ [319.5, 7, 1] == pytest.approx(4 / 3 * math.tan(math.radians(20)))
+
+
+def test_a_graphics_card_draws_the_same(renderer: Renderer, tmp_path: Path) -> None:
+    program = (
+        "import sys, numpy; from app.robot.sim.renderer import Renderer;"
+        "r = Renderer(hardware=True);"
+        "numpy.savez(sys.argv[1], **{name: r.picture(name) for name in r.names})"
+    )
+    # In a process of its own: EGL without a usable display may end it.
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(tmp_path / "egl.npz")], capture_output=True, timeout=60
+    )
+    if done.returncode:
+        pytest.skip("EGL does not work on this machine")
+    drawn = np.load(tmp_path / "egl.npz")
+    for name in renderer.names:
+        other = np.abs(drawn[name].astype(int) - renderer.picture(name)).max(axis=2)
+        assert (other > 60).mean() < 0.05  # light and edges differ, shapes do not
 
 
 @pytest.mark.parametrize("up", [(0, 0, 1), (0.3, 0.2, 1.0)])
