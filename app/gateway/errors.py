@@ -55,6 +55,11 @@ def describe_validation(error: ValidationError | RequestValidationError) -> tupl
     return f"{where}{first['message']}", fields
 
 
+def unexpected_response() -> JSONResponse:
+    """The answer to what nobody foresaw; the caller learns nothing of it."""
+    return JSONResponse(error_body("internal", INTERNAL_MESSAGE), status_code=500)
+
+
 def install_error_handlers(app: FastAPI) -> None:
     """Make every error of ``app`` an answer in the one shape."""
 
@@ -81,12 +86,7 @@ def install_error_handlers(app: FastAPI) -> None:
             error_body(code, message), status_code=error.status_code, headers=error.headers
         )
 
-    async def on_unexpected(_request: Request, _error: Exception) -> JSONResponse:
-        # Starlette's outermost middleware logs the traceback; the caller learns nothing of it.
-        return JSONResponse(error_body("internal", INTERNAL_MESSAGE), status_code=500)
-
     app.add_exception_handler(FarhandError, on_farhand_error)
     app.add_exception_handler(RequestValidationError, on_validation_error)
     app.add_exception_handler(ValidationError, on_validation_error)
     app.add_exception_handler(HTTPException, on_http_error)
-    app.add_exception_handler(Exception, on_unexpected)

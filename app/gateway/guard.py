@@ -10,9 +10,10 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.errors import NotAllowed, NotSignedIn, RequestError
 from app.gateway.auth import Gatekeeper
-from app.gateway.errors import error_response
+from app.gateway.errors import error_response, unexpected_response
 from app.gateway.pages import again_page, sign_in_page
 
+log = logging.getLogger(__name__)
 access_log = logging.getLogger("app.gateway.access")
 
 OPEN_PATHS = frozenset({"/", "/signin", "/api/health"})
@@ -73,7 +74,14 @@ class Guard:
             headers = Headers(scope=scope)
             refusal = self._refusal(headers, method, path, websocket=websocket)
             if refusal is None:
-                await self._app(scope, receive, send_on)
+                try:
+                    await self._app(scope, receive, send_on)
+                except Exception:
+                    log.exception("%s %s failed", method, path[:200])
+                    if status == 0 and not websocket:
+                        await unexpected_response()(scope, receive, send_on)
+                    elif status == 0:
+                        await _reject(unexpected_response(), scope, send_on)
             elif websocket:
                 await _reject(refusal, scope, send_on)
             else:

@@ -1,8 +1,8 @@
 """Starts the robot node and keeps it running: a crash or a hang is noticed, told and mended.
 
-The child is spawned, never forked (Zenoh's threads would not survive that), leads a process group
-of its own, so that Ctrl-C reaches the gateway alone and the gateway ends it in order, and gets the
-end of a pipe as standard input: when the gateway dies, however it dies, the pipe closes.
+The child is spawned, never forked (Zenoh's threads would not survive that), and leads a process
+group of its own, so that Ctrl-C reaches the gateway alone and the gateway ends it in order. It
+watches for its parent's end itself.
 """
 
 import contextlib
@@ -23,7 +23,7 @@ BACK_OFF_S = (0.2, 0.5, 1.0, 2.0, 5.0)
 HEALTHY_S = 10.0
 """A node that ran this long starts again without having its crash held against it."""
 CHECK_S = 0.05
-STOP_WAIT_S = 1.0
+STOP_WAIT_S = 1.5
 """After asking the node to end, and before killing it."""
 _SECRETS = ("FARHAND_TOKEN",)
 
@@ -31,8 +31,8 @@ _SECRETS = ("FARHAND_TOKEN",)
 def node_command(robot: str, endpoint: str, latch: Path) -> list[str]:
     """The command line of a node."""
     return [
-        sys.executable, "-m", "app", "robot",
-        "--id", robot, "--endpoint", endpoint, "--latch", str(latch),
+        sys.executable, "-m", "app.robot.node", "--id", robot, "--endpoint", endpoint,
+        "--latch", str(latch), "--exit-with-parent",
     ]  # fmt: skip
 
 
@@ -125,7 +125,7 @@ class NodeProcess:
         try:
             self._process = subprocess.Popen(
                 self._command,
-                stdin=subprocess.PIPE,
+                stdin=subprocess.DEVNULL,
                 stdout=2,  # standard output is for the link that `farhand serve` prints
                 env=node_environment(),
                 start_new_session=True,
@@ -145,7 +145,6 @@ class NodeProcess:
             if code is not None:
                 # What it left behind, such as its camera process, is of its process group.
                 self._signal(signal.SIGKILL)
-                self._release()
                 return f"robot node crashed ({describe_exit(code)})"
             now = time.monotonic()
             if self._has_spoken():
@@ -163,7 +162,6 @@ class NodeProcess:
         self._signal(signal.SIGKILL)
         if self._process is not None:
             self._process.wait()
-        self._release()
 
     def _end(self) -> None:
         process = self._process
@@ -181,11 +179,6 @@ class NodeProcess:
         if self._process is not None:
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 os.killpg(self._process.pid, number)
-
-    def _release(self) -> None:
-        if self._process is not None and self._process.stdin is not None:
-            with contextlib.suppress(OSError):
-                self._process.stdin.close()
 
 
 def describe_exit(code: int) -> str:

@@ -29,7 +29,7 @@ BACKGROUND = (0.80, 0.84, 0.88)
 
 
 def _quiet() -> contextlib.redirect_stdout[io.StringIO]:
-    """viser prints its address and its end; standard output is for our link alone."""
+    """Quiet: viser prints its address and its end; standard output is for our link alone."""
     return contextlib.redirect_stdout(io.StringIO())
 
 
