@@ -82,7 +82,7 @@ class MotionSettings(_Section):
         default=0.01, description="still when fewer than this part of the pixels mismatch (paper)"
     )
     held_threshold: Fraction = Field(
-        default=0.04,
+        default=0.025,
         description="the same while a gesture is held, so that a hand that trembles keeps it",
     )
     interval_s: float = Field(
@@ -158,7 +158,7 @@ class MatchSettings(_Section):
         "templates are",
     )
     min_reach: float = Field(
-        default=0.24, ge=0.0, le=2.0, description="a match as near as this is never too far"
+        default=0.26, ge=0.0, le=2.0, description="a match as near as this is never too far"
     )
     min_margin: float = Field(
         default=0.03,

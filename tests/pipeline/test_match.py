@@ -1,0 +1,141 @@
+import json
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+
+from app.config import MatchSettings
+from app.errors import Invalid
+from app.pipeline import Gallery, PcaMatcher
+from app.pipeline.features import Features
+from app.pipeline.palm import PalmFinder
+from app.pipeline.views import Views
+from tests.pipeline.drawing import draw_mask, gallery
+
+SETTINGS = MatchSettings()
+PAPER = MatchSettings(features="binary", turns=(0.0,), cuts=(), trims=(0.0,))
+GALLERY = gallery()
+
+
+def views(shape: str, settings: MatchSettings = SETTINGS, **kw):
+    return Views(settings)(PalmFinder()(draw_mask(shape, size=(320, 240), **kw)))
+
+
+@pytest.mark.parametrize("settings", [SETTINGS, PAPER], ids=["product", "paper"])
+def test_enrolled_template_is_its_own_nearest(settings):
+    matcher = PcaMatcher.fit(GALLERY, settings)
+    for label, template in zip(GALLERY.labels, GALLERY.templates, strict=True):
+        matched = matcher.match_template(template)
+        assert matched.match is not None
+        assert matched.match.gesture == label
+        assert matched.match.distance == pytest.approx(0, abs=5e-3)
+        assert matched.match.accepted
+        assert set(matched.distances) == set(GALLERY.labels)
+
+
+@pytest.mark.parametrize("shape", GALLERY.labels)
+@pytest.mark.parametrize("change", [{"shift": (20, 10)}, {"scale": 0.8}])
+def test_same_shape_elsewhere_is_recognised(shape, change):
+    match = PcaMatcher.fit(GALLERY, SETTINGS)(views(shape, **change)).match
+    assert match is not None
+    assert (match.gesture, match.accepted) == (shape, True)
+
+
+def test_empty_gallery_never_matches():
+    assert PcaMatcher.fit(Gallery.empty(), SETTINGS)(views("one")) == (None, {})
+
+
+@pytest.mark.parametrize("settings", [SETTINGS, PAPER], ids=["product", "paper"])
+def test_one_template_is_enough(settings):
+    one = Gallery(("one",), GALLERY.templates[1:2])
+    matcher = PcaMatcher.fit(one, settings)
+    same = matcher.match_template(one.templates[0]).match
+    assert same is not None
+    assert same.accepted
+    assert same.margin is None
+    other = matcher.match_template(GALLERY.templates[3]).match
+    assert other is not None
+    assert not other.accepted
+    json.dumps(asdict(other), allow_nan=False)
+
+
+def test_one_label_with_several_templates_has_no_margin():
+    two = Gallery(("one", "one"), np.stack([GALLERY.templates[1]] * 2))
+    match = PcaMatcher.fit(two, SETTINGS)(views("one")).match
+    assert match is not None
+    assert match.margin is None
+    assert match.accepted
+
+
+def test_reasons_are_plain_sentences():
+    def reason(**kw):
+        settings = MatchSettings(calibrate=False, **kw)
+        match = PcaMatcher.fit(GALLERY, settings)(views("two", settings, scale=0.7)).match
+        assert match is not None
+        assert not match.accepted
+        return match.reason
+
+    far = reason(max_distance=0.0)
+    assert far.startswith("unknown hand: closest is two, but too far (0.")
+    assert far.endswith(", at most 0.00)")
+    assert reason(max_distance=2, max_error=0.0).startswith(
+        "unknown hand: closest is two, but the shape is unlike any enrolled one (0."
+    )
+    assert reason(max_distance=2, max_error=2, min_margin=2).startswith("undecided: two and ")
+
+
+def test_blobs_are_unknown():
+    matcher = PcaMatcher.fit(gallery(("two", "five")), SETTINGS)
+    full = matcher.match_template(np.ones((80, 60), np.uint8)).match
+    assert full is not None
+    assert not full.accepted
+
+
+def test_order_of_enrolment_does_not_matter():
+    turned = Gallery(GALLERY.labels[::-1], GALLERY.templates[::-1])
+    one = PcaMatcher.fit(GALLERY, SETTINGS)(views("two"))
+    other = PcaMatcher.fit(turned, SETTINGS)(views("two"))
+    assert one.distances == pytest.approx(other.distances, abs=1e-4)
+
+
+def test_more_samples_lie_nearer():
+    far = PcaMatcher.fit(GALLERY, SETTINGS)(views("two", scale=0.6)).distances["two"]
+    extra = gallery(("two",), scale=0.6)
+    both = Gallery(
+        GALLERY.labels + extra.labels, np.concatenate([GALLERY.templates, extra.templates])
+    )
+    assert PcaMatcher.fit(both, SETTINGS)(views("two", scale=0.6)).distances["two"] <= far + 1e-3
+
+
+def test_wrong_shapes_are_refused():
+    with pytest.raises(Invalid, match=r"^templates of shape \(1, 60, 80\) where \(1, 80, 60\)"):
+        Gallery(("a",), np.zeros((1, 60, 80), np.uint8))
+
+
+def test_views_vary_turn_and_cut():
+    made = views("five")
+    assert made.shape == (15, 40, 30)
+    assert len({view.tobytes() for view in made}) == 15
+    assert views("five", PAPER).shape == (1, 80, 60)
+
+
+def test_views_of_an_empty_template():
+    assert Views(SETTINGS).of_template(np.zeros((80, 60), np.uint8)).shape == (1, 40, 30)
+    matched = PcaMatcher.fit(GALLERY, SETTINGS).match_template(np.zeros((80, 60), np.uint8))
+    assert matched.match is not None
+    assert not matched.match.accepted
+
+
+def test_distance_features_are_signed_and_squashed():
+    view = np.zeros((1, 40, 30), np.uint8)
+    view[0, 10:30, 8:22] = 1
+    features = Features(SETTINGS)(view).reshape(40, 30)
+    assert features[20, 15] > 0.8
+    assert features[0, 0] < -0.8
+    assert np.all((features > 0) == (view[0] == 1))
+    assert np.abs(features).max() <= 1
+
+
+def test_binary_features_are_the_pixels():
+    view = np.eye(80, 60, dtype=np.uint8)[None]
+    assert np.array_equal(Features(PAPER)(view)[0], view.ravel() * 2.0 - 1)
