@@ -4,18 +4,20 @@
 let canvas = null;
 let context = null;
 
-self.onmessage = async ({ data: { bitmap, width, height, quality } }) => {
+self.onmessage = async ({ data: { picture, width, height, quality } }) => {
     try {
         if (!canvas) {
             canvas = new OffscreenCanvas(width, height);
-            context = canvas.getContext("2d", { alpha: false });
+            // "Read frequently" keeps the canvas in main memory: nothing waits for the graphics
+            // process, which the 3D view may keep busy.
+            context = canvas.getContext("2d", { alpha: false, willReadFrequently: true });
         }
         if (canvas.width !== width || canvas.height !== height) {
             canvas.width = width;
             canvas.height = height;
         }
-        context.drawImage(bitmap, 0, 0, width, height);
-        bitmap.close();
+        context.drawImage(picture, 0, 0, width, height);
+        picture.close();
         const blob = await canvas.convertToBlob({ type: "image/jpeg", quality });
         const jpeg = await blob.arrayBuffer();
         self.postMessage({ jpeg }, [jpeg]);

@@ -9,6 +9,18 @@ export function sentSize(width, height) {
     return [Math.max(1, Math.round(width * scale)), Math.max(1, Math.round(height * scale))];
 }
 
+/** The video's picture now, to hand to the worker. A VideoFrame is not copied; a bitmap is. */
+function take(video) {
+    if (typeof VideoFrame === "function") {
+        try {
+            return new VideoFrame(video);
+        } catch {
+            // Some browsers make none from some videos.
+        }
+    }
+    return createImageBitmap(video);
+}
+
 /** Encodes one picture at a time, in a worker where the browser can, else on the page's thread. */
 export class JpegEncoder {
     #worker = null;
@@ -34,11 +46,11 @@ export class JpegEncoder {
         if (!video.videoWidth || video.readyState < 2) return null;
         const [width, height] = sentSize(video.videoWidth, video.videoHeight);
         if (this.#worker) {
-            const bitmap = await createImageBitmap(video);
+            const picture = await take(video);
             const answered = new Promise((resolve) => {
                 this.#waiting = resolve;
             });
-            this.#worker.postMessage({ bitmap, width, height, quality }, [bitmap]);
+            this.#worker.postMessage({ picture, width, height, quality }, [picture]);
             const { jpeg } = await answered;
             if (jpeg) return { jpeg, width, height };
             this.#worker.terminate(); // this browser's workers cannot do it

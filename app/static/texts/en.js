@@ -125,6 +125,7 @@ export const texts = Object.freeze({
         age: (seconds) => `${seconds} s old`,
         hide: "Hide the 3D view",
         show: "Show the 3D view",
+        slow3d: "It is slow on this computer, and slows the camera too.",
         no3d: "This browser cannot draw 3D here (WebGL is off). The camera pictures do the same.",
         loading3d: "Loading the 3D view…",
         failed3d: "The 3D view did not load.",

@@ -61,7 +61,11 @@ export function sentenceFor(state, now) {
         const gesture = seen(state);
         return gesture ? words.seenIdle(gesture, words.disarmed) : words.disarmed;
     }
-    if (mode === "holding") return `${words.holding(why)} ${words.holdingNext}`;
+    if (mode === "holding") {
+        // Some reasons say themselves how to go on.
+        const next = /gesture/.test(why) ? "" : ` ${words.holdingNext}`;
+        return words.holding(why) + next;
+    }
     return whileDriving(state, now);
 }
 

@@ -75,21 +75,28 @@ class CameraView {
     }
 }
 
-function canDraw3d() {
-    try {
-        const canvas = document.createElement("canvas");
-        return Boolean(canvas.getContext("webgl2") || canvas.getContext("webgl"));
-    } catch {
-        return false;
-    }
+/** How this browser draws in three dimensions: "fast", "slow" (without a GPU) or "none". */
+function drawing3d() {
+    const works = (options) => {
+        try {
+            const context = document.createElement("canvas").getContext("webgl2", options);
+            const ending = context && context.getExtension("WEBGL_lose_context");
+            if (ending) ending.loseContext();
+            return context !== null;
+        } catch {
+            return false;
+        }
+    };
+    if (works({ failIfMajorPerformanceCaveat: true })) return "fast";
+    return works({}) ? "slow" : "none";
 }
 
 /** The 3D view in its frame: loaded when first seen, and again when the server came back. */
 class View3d {
-    constructor(enlarge, onFrame, hidden, onHide) {
+    constructor(enlarge, onFrame, { drawing, hidden, onHide }) {
         this.onFrame = onFrame;
         this.visible = false;
-        this.possible = null;
+        this.drawing = drawing;
         this.frame = null;
         const label = texts.stage.views["3d"];
         this.note = el("p", { class: "view-empty" });
@@ -114,7 +121,12 @@ class View3d {
             "div",
             { class: "view view-3d is-empty", id: "view-3d", data: { view: "3d" } },
             this.note,
-            this.show,
+            el(
+                "div",
+                { class: "view-offer" },
+                this.show,
+                drawing === "slow" ? el("p", { class: "quiet", text: texts.stage.slow3d }) : null,
+            ),
             el("p", { class: "view-title" }, el("span", { text: label })),
             el("div", { class: "view-tools" }, this.big, this.hide),
         );
@@ -123,6 +135,7 @@ class View3d {
     }
 
     setHidden(hidden) {
+        const before = this.hidden;
         this.hidden = hidden;
         this.element.classList.toggle("is-hidden", hidden);
         this.show.hidden = !hidden;
@@ -130,14 +143,13 @@ class View3d {
         this.big.hidden = hidden;
         if (hidden) this.#unload();
         else this.load();
-        this.onHide(hidden);
+        if (before !== undefined) this.onHide(hidden);
     }
 
     /** Load the frame if it is wanted, seen, and can be drawn. */
     load() {
         if (this.hidden || !this.visible || this.frame) return;
-        if (this.possible === null) this.possible = canDraw3d();
-        if (!this.possible) {
+        if (this.drawing === "none") {
             setText(this.note, texts.stage.no3d);
             return;
         }
@@ -194,11 +206,14 @@ export function stage(element, store, { feeds, onFrame, memory }) {
     };
     const swap = () => enlarge(element.dataset.large === "wrist" ? "scene" : "wrist");
     const cameras = CAMERAS.map((name) => new CameraView(name, feeds[name], { enlarge, swap }));
-    const hidden = memory.get("hide-3d") === "yes";
-    const view3d = new View3d(enlarge, onFrame, hidden, (now) => {
+    const drawing = drawing3d();
+    // Without a GPU the 3D view takes the very processor that the frames need: only if asked for.
+    const hidden = (memory.get("hide-3d") || (drawing === "slow" ? "yes" : "no")) === "yes";
+    const onHide = (now) => {
         memory.set("hide-3d", now ? "yes" : "no");
         if (now && element.dataset.large === "3d") enlarge("wrist");
-    });
+    };
+    const view3d = new View3d(enlarge, onFrame, { drawing, hidden, onHide });
     const views = [...cameras, view3d];
     element.append(...views.map((view) => view.element));
     const last = memory.get("large");
