@@ -126,8 +126,7 @@ class GatewayEnd:
         self.robot = robot
         self.invalid: Counter[str] = Counter()
         """Messages that could not be read, by kind."""
-        self.alive = False
-        """Whether the node's liveliness token is there."""
+        self._alive = threading.Event()
         self._newest: tuple[State, float] | None = None
         self._on_state = on_state
         self._on_alive = on_alive
@@ -154,6 +153,11 @@ class GatewayEnd:
     def state(self) -> State | None:
         """The newest State, or None before the first."""
         return None if self._newest is None else self._newest[0]
+
+    @property
+    def alive(self) -> bool:
+        """Whether the node's liveliness token is there."""
+        return self._alive.is_set()
 
     @property
     def state_age_s(self) -> float:
@@ -232,11 +236,14 @@ class GatewayEnd:
             )
 
     def _ask(self, what: str, kind: type[M], payload: bytes, timeout: float) -> M:
+        deadline = time.monotonic() + timeout
+        # A question to a node that is just starting would be lost: its token says it listens.
+        self._alive.wait(timeout)
         try:
             replies = self._session.get(
                 key(self.robot, what),
                 payload=payload,
-                timeout=timeout,
+                timeout=max(0.01, deadline - time.monotonic()),
                 congestion_control=zenoh.CongestionControl.DROP,  # of the reply, too
                 priority=zenoh.Priority.INTERACTIVE_HIGH,
                 express=True,
@@ -263,7 +270,10 @@ class GatewayEnd:
             self._on_state(state)
 
     def _take_liveliness(self, sample: zenoh.Sample) -> None:
-        self.alive = sample.kind == zenoh.SampleKind.PUT
+        if sample.kind == zenoh.SampleKind.PUT:
+            self._alive.set()
+        else:
+            self._alive.clear()
         if (tell := self._on_alive) is not None:
             try:
                 tell(self.alive)

@@ -41,6 +41,7 @@ def open_session(endpoint: str, *, listen: bool) -> zenoh.Session:
         "mode": "router" if listen else "client",
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
+        "scouting/delay": 0,  # nothing is scouted, so there is nothing to wait for
         "listen/endpoints": [endpoint] if listen else [],
         "connect/endpoints": [] if listen else [endpoint],
     }

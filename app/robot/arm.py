@@ -50,9 +50,20 @@ class Kinematics(Protocol):
 class Arm(Protocol):
     """One arm with a gripper. Not thread-safe: the control loop is its only user."""
 
-    description: Description
-    home: Vector
-    kinematics: Kinematics
+    @property
+    def description(self) -> Description:
+        """What the robot is."""
+        ...
+
+    @property
+    def home(self) -> Vector:
+        """The joints (rad, shape (n,)) of the action ``home``, inside the limits."""
+        ...
+
+    @property
+    def kinematics(self) -> Kinematics:
+        """Its geometry."""
+        ...
 
     def read(self) -> Reading:
         """Measure."""

@@ -68,6 +68,7 @@ def test_a_command_arrives_as_it_was_sent(node: NodeEnd, gateway: GatewayEnd) ->
 def test_of_many_commands_the_newest_stay(node: NodeEnd, gateway: GatewayEnd) -> None:
     for sequence in range(500):
         gateway.send(command(sequence))
+        time.sleep(0.0005)
     time.sleep(0.3)  # nobody reads meanwhile
     sequences = [c.sequence for c in node.commands()]
     assert sequences[-1] == 499

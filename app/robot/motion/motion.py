@@ -18,6 +18,7 @@ from app.link.actions import (
 )
 from app.robot.arm import Arm, Reading, Vector
 from app.robot.motion import sequence
+from app.robot.motion.ask_for_stop import AskForStop
 from app.robot.motion.cartesian_jog import CartesianJog
 from app.robot.motion.go_to import GoTo
 from app.robot.motion.grip import Grip
@@ -51,6 +52,8 @@ class Motion:
         self.trajectory = JointTrajectory(limits, arm.read().joints, dt)
         self.action: Action | None = None
         """What is being done, until the arm is at rest again."""
+        self.wants_stop = False
+        """A sequence has come to a stop: the caller is to stop the robot."""
         self._task: Task | None = None
         self._braking_hard = False
         self._width: float | None = None
@@ -115,6 +118,7 @@ class Motion:
     def reset(self, joints: Vector) -> None:
         """Be at rest where the arm really is, at ``joints`` (rad, shape (n,))."""
         self._task = self.action = None
+        self.wants_stop = False
         self._braking_hard = False
         self.trajectory.reset(joints)
 
@@ -160,7 +164,10 @@ class Motion:
             case Sequence():
                 return sequence.Sequence([self._maker(step) for step in action.steps])
             case Stop():
-                raise ValueError("a stop is no motion; the safety supervisor does it")
+                return AskForStop(self._ask_for_stop)
+
+    def _ask_for_stop(self) -> None:
+        self.wants_stop = True
 
     def _maker(self, step: Action) -> Callable[[], Task]:
         return lambda: self._task_of(step)

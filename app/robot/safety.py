@@ -1,0 +1,157 @@
+"""When the arm may move, and how it stops: one state machine.
+
+::
+
+    phase     | arm      disarm    lease   stop S2,   stop S1,  N: no gesture  reset
+              |                    gone    watchdog   stop S0   for 0.5 s
+    ----------+--------------------------------------------------------------------------
+    DISARMED  | HOLDING  -         -       -          STOPPED   -              -
+    HOLDING   | HOLDING  DISARMED  DISARM  HOLDING    STOPPED   ARMED          -
+    ARMED     | HOLDING  DISARMED  DISARM  HOLDING    STOPPED   -              -
+    STOPPED   | refused  -         -       -          worst     -              DISARMED
+
+Only in ARMED does anything move. The three categories of a stop:
+
+- S2: ramp to standstill within 200 ms, hold with power. Resumes by N, then a new gesture.
+- S1: ramp, then brakes on and motors off. Latched: resumes by a reset, then arm, then N.
+- S0: brakes on and motors off at once. Latched like S1.
+
+Arming leaves S2 in force, so that every way back ends in N: nothing begins to move because of a
+hand that was up already. Times are seconds on the node's monotonic clock, and nothing else.
+"""
+
+import enum
+import logging
+
+from app.link.messages import LeaseReply, StopCategory, StopRequest
+from app.robot.latch import StopLatch
+
+log = logging.getLogger(__name__)
+
+NO_GESTURE_S = 0.5
+"""N: commands must show no gesture for so long."""
+
+
+class Phase(enum.Enum):
+    """What the arm may do."""
+
+    DISARMED = "disarmed"
+    HOLDING = "holding"
+    ARMED = "armed"
+    STOPPED = "stopped"
+
+
+_WORST: dict[StopCategory | None, int] = {None: 0, "S2": 2, "S1": 3, "S0": 4}
+
+
+class Safety:
+    """Holds the phase, the category of stop in force and the reason for both.
+
+    Args:
+        latch: Where a latched stop is kept; one that is there from before stays in force.
+    """
+
+    def __init__(self, latch: StopLatch) -> None:
+        self._latch = latch
+        self.phase = Phase.DISARMED
+        self.category: StopCategory | None = None
+        """The stop in force."""
+        self.reason: str | None = "not armed yet"
+        self.stops = 0
+        """Stop requests received."""
+        self._no_gesture_since: float | None = None
+        if (before := latch.load()) is not None:
+            category: StopCategory = "S0" if before.category == "S0" else "S1"
+            self._go(Phase.STOPPED, category, f"{before.reason} (from before the node started)")
+
+    @property
+    def armed(self) -> bool:
+        """Somebody armed the robot, and nothing has disarmed it since."""
+        return self.phase in (Phase.ARMED, Phase.HOLDING)
+
+    @property
+    def may_move(self) -> bool:
+        """Motion is allowed."""
+        return self.phase is Phase.ARMED
+
+    def request(self, stop: StopRequest) -> None:
+        """Somebody asks for a stop."""
+        self.stops += 1
+        self.stop(stop)
+
+    def stop(self, stop: StopRequest) -> None:
+        """Stop now. The worst category in force wins; S1 and S0 latch, armed or not."""
+        why = f"{stop.reason} ({stop.source})"
+        if stop.category == "S2":
+            self.hold(why)
+            return
+        if _WORST[stop.category] <= _WORST[self.category]:
+            log.info("stop %s changes nothing, %s is in force: %s", stop.category, self.phase, why)
+            return
+        self._go(Phase.STOPPED, stop.category, why)
+        self._latch.set(stop)
+
+    def hold(self, reason: str) -> None:
+        """S2: stand until N. Changes nothing where the arm may not move anyway."""
+        self._no_gesture_since = None
+        if self.armed:
+            self._go(Phase.HOLDING, "S2", reason)
+
+    def arm(self) -> LeaseReply:
+        """A: the operator arms. Whether the operator may was checked before."""
+        if self.phase is Phase.STOPPED:
+            return LeaseReply(
+                granted=False, code="latched", reason=f"stopped: {self.reason}; reset it first"
+            )
+        self._no_gesture_since = None
+        self._go(
+            Phase.HOLDING, "S2", "armed: show no gesture for half a second, then a new gesture"
+        )
+        return LeaseReply(granted=True)
+
+    def disarm(self, reason: str) -> None:
+        """Nothing moves until somebody arms again."""
+        if self.phase is not Phase.STOPPED:
+            self._go(Phase.DISARMED, None, reason)
+
+    def lease_gone(self, reason: str) -> None:
+        """S2, and whoever drives next must arm again."""
+        if self.armed:
+            self._go(Phase.DISARMED, "S2", reason)
+
+    def reset(self, *, at_rest: bool) -> LeaseReply:
+        """Leave the latched stop. Moves nothing, and leaves the robot disarmed."""
+        if self.phase is not Phase.STOPPED:
+            return LeaseReply(granted=True, reason="nothing to reset")
+        if not at_rest:
+            return LeaseReply(granted=False, code="moving", reason="the arm has not come to rest")
+        self._latch.clear()
+        self._go(Phase.DISARMED, None, "reset; not armed yet")
+        return LeaseReply(granted=True)
+
+    def saw(self, now: float, *, gesture: bool) -> None:
+        """A valid command arrived, with or without a gesture: N."""
+        if gesture:
+            self._no_gesture_since = None
+            return
+        if self._no_gesture_since is None:
+            self._no_gesture_since = now
+        if self.phase is Phase.HOLDING and now - self._no_gesture_since >= NO_GESTURE_S:
+            self._go(Phase.ARMED, None, None)
+
+    def silence(self) -> None:
+        """No valid command for longer than one lives: N begins anew."""
+        self._no_gesture_since = None
+
+    def _go(self, phase: Phase, category: StopCategory | None, reason: str | None) -> None:
+        before = (self.phase, self.category, self.reason)
+        if before != (phase, category, reason):
+            log.info(
+                "%s %s -> %s %s: %s",
+                self.phase.value,
+                self.category or "",
+                phase.value,
+                category or "",
+                reason or "ready",
+            )
+        self.phase, self.category, self.reason = phase, category, reason
