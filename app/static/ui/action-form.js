@@ -49,7 +49,8 @@ function kindOf(action) {
 
 /**
  * A form for one action. `value()` reads it; `element` goes into the page. Inside a sequence
- * (`step` is true) jogs ask for how long, and there are no sequences.
+ * (`step` is true) jogs ask for how long, and there are no sequences. `touched` says whether
+ * anything was changed: an untouched action is not read back, since degrees are shown rounded.
  */
 export class ActionForm {
     constructor(action, { description = null, step = false } = {}) {
@@ -60,6 +61,12 @@ export class ActionForm {
         this.kind = select("kind", kinds.map((kind) => [kind, words.kinds[kind]]), kindOf(this.action));
         this.fields = el("div", { class: "fields" });
         this.element = el("div", { class: "action-form" }, field(words.kind, this.kind), this.fields);
+        this.touched = false;
+        for (const kind of ["input", "change", "click"]) {
+            this.element.addEventListener(kind, ({ target }) => {
+                if (kind !== "click" || target.closest("button")) this.touched = true;
+            });
+        }
         this.kind.addEventListener("change", () => this.#draw());
         this.#draw();
     }

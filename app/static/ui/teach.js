@@ -74,15 +74,14 @@ export function teachContent({ gesture, store, video, grab, act, recognise, temp
         const wanted = name.value.trim();
         if (!wanted) return refuse(words.nameMissing, name);
         if (!form.check()) return refuse("", null);
-        const action = form.value();
         if (!gesture) {
             if (!capture.stills.length) return refuse(words.stillsMissing, capture.one);
-            await act.create(wanted, action, capture.stills);
+            await act.create(wanted, form.value(), capture.stills);
             return done(words.saved(wanted));
         }
         const changes = {};
         if (wanted !== gesture.name) changes.name = wanted;
-        if (JSON.stringify(action) !== JSON.stringify(gesture.action)) changes.action = action;
+        if (form.touched) changes.action = form.value();
         if (Object.keys(changes).length) await act.update(gesture.id, changes);
         if (capture.stills.length) {
             await act.addSamples(gesture.id, capture.stills);

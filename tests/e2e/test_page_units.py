@@ -1,0 +1,184 @@
+"""The page's modules by themselves: no server behind them but one for static files."""
+
+import json
+import re
+import struct
+import threading
+from collections.abc import Iterator
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, Playwright
+
+from app.gateway.messages import CLIENT_MESSAGES, SERVER_MESSAGES
+from app.link.actions import ACTION
+from app.link.header import HEADER_SIZE, FrameHeader
+from tests.e2e.running import BASE_ARGUMENTS
+
+STATIC = Path(__file__).parents[2] / "app" / "static"
+SCRIPTS = sorted(STATIC.rglob("*.js"))
+
+
+class _Quiet(SimpleHTTPRequestHandler):
+    def log_message(self, format: str, *args: Any) -> None:
+        pass
+
+
+@pytest.fixture(scope="module")
+def modules(playwright: Playwright, chromium: str) -> Iterator[Page]:
+    """An HTML page (the server's "not found") of the same origin as the modules."""
+    handler = partial(_Quiet, directory=str(STATIC.parent))
+    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    thread = threading.Thread(target=server.serve_forever, daemon=True)
+    thread.start()
+    browser = playwright.chromium.launch(executable_path=chromium, args=list(BASE_ARGUMENTS))
+    page = browser.new_page()
+    page.goto(f"http://127.0.0.1:{server.server_address[1]}/none")
+    yield page
+    browser.close()
+    server.shutdown()
+    server.server_close()
+    thread.join()
+
+
+def run(page: Page, module: str, script: str, argument: Any = None) -> Any:
+    """Evaluate ``script`` with the exports of ``module`` as ``m`` and ``argument`` as ``a``."""
+    return page.evaluate(
+        f"async (a) => {{ const m = await import('/static/{module}'); {script} }}", argument
+    )
+
+
+def test_message_names_agree_with_the_server(modules: Page) -> None:
+    names = run(modules, "core/protocol.js", "return [m.CLIENT_MESSAGES, m.SERVER_MESSAGES]")
+    assert tuple(names[0]) == CLIENT_MESSAGES
+    assert tuple(names[1]) == SERVER_MESSAGES
+
+
+def test_frame_header_is_what_the_server_reads(modules: Page) -> None:
+    script = "return [...new Uint8Array(m.packFrame(7, 1234.5, 2 ** 40, new ArrayBuffer(3)))]"
+    message = bytes(run(modules, "core/protocol.js", script))
+    assert FrameHeader.unpack(message) == FrameHeader(7, 1234.5, 2**40)
+    assert len(message) == HEADER_SIZE + 3
+
+
+def test_frame_header_never_carries_what_the_server_refuses(modules: Page) -> None:
+    script = "return [...new Uint8Array(m.packFrame(2 ** 32 + 1, -3, NaN, new ArrayBuffer(0)))]"
+    message = bytes(run(modules, "core/protocol.js", script))
+    assert FrameHeader.unpack(message) == FrameHeader(1, 0.0, 0)
+
+
+def test_pictures_are_unpacked_and_nonsense_is_not(modules: Page) -> None:
+    good = FrameHeader(5, 10.0, 99).pack() + b"jpeg"
+    script = (
+        "const p = m.unpackPicture(Uint8Array.from(a).buffer);"
+        "return p && [p.seq, p.capturedMs, p.tick, [...p.jpeg]]"
+    )
+    assert run(modules, "core/protocol.js", script, list(good)) == [5, 10, 99, list(b"jpeg")]
+    wrong_version = struct.pack("<2sBBIdQ", b"FH", 2, 0, 5, 10.0, 99) + b"jpeg"
+    for bad in (b"", good[:24], b"XX" + good[2:], wrong_version):
+        assert run(modules, "core/protocol.js", script, list(bad)) is None
+
+
+@pytest.mark.parametrize(
+    ("action", "words"),
+    [
+        ({"type": "jog_cartesian", "linear": [0.1, 0, 0]}, "forward 10 cm/s"),
+        ({"type": "jog_cartesian", "linear": [0, -0.1, 0.05]}, "right 10 cm/s, up 5 cm/s"),
+        ({"type": "jog_cartesian", "angular": [0, 0, -0.5]}, "turn about z \N{MINUS SIGN}28.6°/s"),
+        (
+            {"type": "jog_cartesian", "frame": "tool", "linear": [0, 0, -0.02]},
+            "against tool z 2 cm/s",
+        ),
+        ({"type": "jog_joint", "joint": 2, "velocity": -0.5}, "turn joint 2 \N{MINUS SIGN}28.6°/s"),
+        ({"type": "turn_joint", "joint": 1, "angle": 0.5235987755982988}, "turn joint 1 by 30°"),
+        ({"type": "pose", "name": "ready"}, "go to “ready”"),
+        ({"type": "gripper", "width": 0.0}, "close gripper"),
+        ({"type": "gripper", "width": 0.08}, "open gripper"),
+        ({"type": "gripper", "width": 0.04}, "gripper to 40 mm"),
+        ({"type": "home"}, "go home"),
+        ({"type": "stop"}, "stop the robot"),
+        (
+            {
+                "type": "sequence",
+                "steps": [
+                    {"type": "jog_cartesian", "linear": [0, 0, 0.1], "duration": 2},
+                    {"type": "home"},
+                ],
+            },
+            "up 10 cm/s for 2 s, then 1 step",
+        ),
+    ],
+)
+def test_actions_in_plain_words(modules: Page, action: dict[str, Any], words: str) -> None:
+    sent = ACTION.dump_python(ACTION.validate_json(json.dumps(action)), mode="json")
+    assert run(modules, "ui/words.js", "return m.describeAction(a)", sent) == words
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        {"type": "jog_cartesian", "linear": [0.1, 0, 0]},
+        {"type": "jog_cartesian", "frame": "tool", "linear": [0, 0.1, 0.2], "angular": [0, 0, 1]},
+        {"type": "jog_joint", "joint": 6, "velocity": 0.5},
+        {"type": "turn_joint", "joint": 3, "angle": -0.7},
+        {"type": "pose", "name": "ready"},
+        {"type": "gripper", "width": 0.03},
+        {"type": "home"},
+        {"type": "stop"},
+        {
+            "type": "sequence",
+            "steps": [
+                {"type": "jog_joint", "joint": 2, "velocity": 0.2, "duration": 1.5},
+                {"type": "pose", "name": "ready"},
+                {"type": "gripper", "width": 0.0},
+            ],
+        },
+    ],
+)
+def test_the_form_gives_back_the_action_it_was_given(modules: Page, action: dict[str, Any]) -> None:
+    script = "return new m.ActionForm(a, { description: null }).value()"
+    value = run(modules, "ui/action-form.js", script, action)
+    given = ACTION.validate_json(json.dumps(action)).model_dump()
+    assert _rounded(ACTION.validate_json(json.dumps(value)).model_dump()) == _rounded(given)
+
+
+def _rounded(value: Any) -> Any:
+    """Degrees are shown with two digits; that much may be lost."""
+    if isinstance(value, float):
+        return round(value, 3)
+    if isinstance(value, dict):
+        return {key: _rounded(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_rounded(item) for item in value]
+    return value
+
+
+def test_every_icon_and_text_that_is_named_exists() -> None:
+    icons = set(re.findall(r'<symbol id="([\w-]+)"', (STATIC / "icons/icons.svg").read_text()))
+    code = "\n".join(path.read_text() for path in SCRIPTS)
+    html = (STATIC / "index.html").read_text()
+    named = set(re.findall(r'(?:iconName: |icon\()"([\w-]+)"', code))
+    named |= set(re.findall(r'data-icon="([\w-]+)"', html))
+    named |= {"mode-" + mode for mode in ("disarmed", "armed", "moving", "holding", "stopped")}
+    assert named <= icons
+
+
+def test_core_knows_no_page_and_ui_opens_no_sockets() -> None:
+    for path in SCRIPTS:
+        code = path.read_text()
+        if path.parent.name == "core":
+            assert not re.search(r"getElementById|querySelector|\.\./ui/|\.\./texts/", code), path
+        if path.parent.name == "ui":
+            assert not re.search(r"new WebSocket|fetch\(|\.\./core/", code), path
+
+
+def test_nothing_foreign_and_nothing_inline() -> None:
+    html = (STATIC / "index.html").read_text()
+    assert not re.search(r"\sstyle=|<style|\son\w+=|<script(?![^>]*\ssrc=)", html)
+    for path in STATIC.rglob("*.*"):
+        text = path.read_text().replace("http://www.w3.org/2000/svg", "")
+        assert not re.search(r"https?://\w", text), path
+        assert "innerHTML" not in text, path
