@@ -84,12 +84,12 @@ def test_too_few(tree, shots, trials, message):
 
 
 def test_missing_and_empty_folders(tree, tmp_path):
-    with pytest.raises(NotFound, match="^no folder "):
+    with pytest.raises(NotFound, match=r"^no folder "):
         evaluate(tmp_path / "none")
     (tmp_path / "label").mkdir()
-    with pytest.raises(Invalid, match="^no pictures in "):
+    with pytest.raises(Invalid, match=r"^no pictures in "):
         evaluate(tmp_path)
-    with pytest.raises(Invalid, match="^every label in .* is enrolled: others are needed$"):
+    with pytest.raises(Invalid, match=r"^every label in .* is enrolled: others are needed$"):
         evaluate(tree, unknown=tree)
 
 
@@ -97,7 +97,7 @@ def test_no_hand_anywhere(tmp_path):
     (tmp_path / "a").mkdir()
     for n in range(3):
         (tmp_path / "a" / f"{n}.png").write_bytes(encoded(np.zeros((64, 64, 3), np.uint8)))
-    with pytest.raises(Invalid, match="^no hand was found in any of the pictures$"):
+    with pytest.raises(Invalid, match=r"^no hand was found in any of the pictures$"):
         evaluate(tmp_path)
 
 

@@ -191,5 +191,5 @@ def test_pack_and_unpack():
 def test_wrong_sizes_are_refused():
     with pytest.raises(Invalid, match=r"^a template is 80 rows of 60 pixels, not \(60, 80\)$"):
         pack_template(np.zeros((60, 80), np.uint8))
-    with pytest.raises(Invalid, match="^a packed template has 600 bytes, not 3$"):
+    with pytest.raises(Invalid, match=r"^a packed template has 600 bytes, not 3$"):
         unpack_template(b"abc")

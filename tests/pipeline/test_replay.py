@@ -52,12 +52,12 @@ def test_large_frames_are_made_smaller(tmp_path):
 
 
 def test_what_cannot_be_read(tmp_path):
-    with pytest.raises(NotFound, match="^no file or folder "):
+    with pytest.raises(NotFound, match=r"^no file or folder "):
         replay(tmp_path / "none", pipeline())
-    with pytest.raises(Invalid, match="^no frame in "):
+    with pytest.raises(Invalid, match=r"^no frame in "):
         list(replay(tmp_path, pipeline()))
-    with pytest.raises(Invalid, match="^-1 frames a second: more than 0 is needed$"):
+    with pytest.raises(Invalid, match=r"^-1 frames a second: more than 0 is needed$"):
         replay(tmp_path, pipeline(), fps=-1)
     (tmp_path / "text.mp4").write_text("no video")
-    with pytest.raises(Invalid, match="is not a video that can be read$"):
+    with pytest.raises(Invalid, match=r"is not a video that can be read$"):
         replay(tmp_path / "text.mp4", pipeline())

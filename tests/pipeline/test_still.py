@@ -159,15 +159,13 @@ def test_no_hand_is_refused_with_the_reason():
 
 def test_hand_that_runs_out_of_the_picture():
     data = encoded(draw("five", shift=(250, 0), scale=1.4))
-    with pytest.raises(
-        ImageRefused, match=r"^the hand is cut off at the bottom of the picture: show all"
-    ):
+    with pytest.raises(ImageRefused, match=r"^the hand is cut off at the bottom of the"):
         extract_template(data, SETTINGS)
     assert extract_template(data, SETTINGS, whole=False).template.any()
 
 
 def test_too_many_bytes():
-    with pytest.raises(TooLarge, match="at most 4194304 are accepted"):
+    with pytest.raises(TooLarge, match=r"at most 4194304 are accepted"):
         extract_template(bytes((4 << 20) + 1), SETTINGS)
 
 
