@@ -32,14 +32,14 @@ class Binarise:
 
     The threshold ``t`` maximises the variance between the classes
     ``w0 w1 (mu0 - mu1)^2`` over the histogram, where ``w`` are the classes' weights and ``mu``
-    their means. With polarity ``auto`` the hand is the side that holds less of the picture's
+    their means; levels above it are one class. It is computed from the histogram that normalising
+    leaves behind. With polarity ``auto`` the hand is the side that holds less of the picture's
     border: an arm crosses a part of one side, the background has the rest.
     """
 
     def __init__(self, settings: BinariseSettings) -> None:
         self._settings = settings
         self._mask: U8 = np.empty(0, np.uint8)
-        self._histogram: NDArray[np.float32] = np.zeros((256, 1), np.float32)
 
     def __call__(self, picture: Normalised) -> Binary:
         """Threshold one normalised plane."""
@@ -47,24 +47,15 @@ class Binarise:
         if self._mask.shape != plane.shape:
             self._mask = np.empty(plane.shape, np.uint8)
         mask = self._mask
-        level, _ = cv2.threshold(plane, 0, 1, cv2.THRESH_BINARY | cv2.THRESH_OTSU, dst=mask)
-        contrast = self._contrast(plane, int(level)) * (picture.high - picture.low) / 255
+        level, difference = otsu(picture.counts)
+        cv2.threshold(plane, level, 1, cv2.THRESH_BINARY, dst=mask)
+        contrast = difference * (picture.high - picture.low) / 255
         light = self._hand_is_light(mask)
         if contrast <= 0 or contrast < self._settings.min_contrast:
             mask.fill(0)
         elif not light:
             cv2.bitwise_xor(mask, 1, dst=mask)  # type: ignore[call-overload]
-        return Binary(mask, int(level), contrast, light)
-
-    def _contrast(self, plane: U8, level: int) -> float:
-        cv2.calcHist([plane], [0], None, [256], [0, 256], hist=self._histogram)
-        counts = self._histogram[:, 0]
-        below, above = float(counts[: level + 1].sum()), float(counts[level + 1 :].sum())
-        if below == 0 or above == 0:
-            return 0.0
-        mean_below = float(_LEVELS[: level + 1] @ counts[: level + 1]) / below
-        mean_above = float(_LEVELS[level + 1 :] @ counts[level + 1 :]) / above
-        return mean_above - mean_below
+        return Binary(mask, level, contrast, light)
 
     def _hand_is_light(self, mask: U8) -> bool:
         if self._settings.polarity != "auto":
@@ -74,4 +65,22 @@ class Binarise:
         return bool(white <= height + width)
 
 
-_LEVELS = np.arange(256, dtype=np.float32)
+_LEVELS = np.arange(256, dtype=np.float64)
+
+
+def otsu(counts: NDArray[np.int32]) -> tuple[int, float]:
+    """Threshold of a (256,) histogram, and the difference of the means of its two sides.
+
+    With ``n(t)`` pixels of sum ``s(t)`` up to level ``t``, of ``N`` and ``S`` in all, the variance
+    between the classes is proportional to ``(S n - N s)^2 / (n (N - n))``.
+    """
+    below = np.cumsum(counts, dtype=np.float64)
+    total = np.cumsum(counts * _LEVELS)
+    spread = total[-1] * below - below[-1] * total
+    weights = below * (below[-1] - below)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        between = np.where(weights > 0, spread * spread / weights, 0.0)
+    level = int(between.argmax())
+    if weights[level] <= 0:
+        return level, 0.0
+    return level, float(spread[level] / weights[level])

@@ -29,9 +29,11 @@ class Features:
         if not self._distance:
             return (views.reshape(len(views), -1).astype(np.float32) * 2) - 1
         out = np.empty(views.shape, np.float32)
-        for view, row in zip(views, out, strict=True):
-            outside = cv2.distanceTransform(1 - view, cv2.DIST_L2, 3)
-            cv2.subtract(cv2.distanceTransform(view, cv2.DIST_L2, 3), outside, dst=row)
+        outside = np.empty(views.shape, np.float32)
+        for view, rest, row, far in zip(views, views ^ 1, out, outside, strict=True):
+            cv2.distanceTransform(view, cv2.DIST_L2, 3, dst=row)
+            cv2.distanceTransform(rest, cv2.DIST_L2, 3, dst=far)
+        out -= outside
         out *= 1 / (SQUASH * views.shape[2])
         np.tanh(out, out=out)
         return out.reshape(len(views), -1)

@@ -1,6 +1,6 @@
 """Normalise: illumination stretched to the full range (paper: the other stage on the DSP)."""
 
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import cv2
 import numpy as np
@@ -17,11 +17,18 @@ class Normalised(NamedTuple):
         plane: (h, w); a buffer that the next call overwrites.
         low: Level of the input that became 0.
         high: Level of the input that became 255.
+        counts: (256,) pixels of each level of ``plane``. A buffer as well.
     """
 
     plane: U8
     low: int
     high: int
+    counts: NDArray[np.int32]
+
+    @classmethod
+    def of(cls, plane: U8, low: int = 0, high: int = 255) -> Self:
+        """A plane that is normalised already; its levels are counted."""
+        return cls(plane, low, high, np.bincount(plane.ravel(), minlength=256).astype(np.int32))
 
 
 class Normalise:
@@ -38,6 +45,7 @@ class Normalise:
         self._histogram: NDArray[np.float32] = np.zeros((256, 1), np.float32)
         self._below: NDArray[np.int32] = np.zeros(256, np.int32)
         self._counts: NDArray[np.int32] = np.zeros(256, np.int32)
+        self._stretched: NDArray[np.int32] = np.zeros(256, np.int32)
         self._levels: NDArray[np.int32] = np.arange(256, dtype=np.int32)
         self._ramp: NDArray[np.int32] = np.zeros(256, np.int32)
         self._lut: U8 = np.zeros(256, np.uint8)
@@ -54,11 +62,14 @@ class Normalise:
         high = int(np.searchsorted(self._below, plane.size - drop, side="left"))
         if high <= low:
             np.copyto(self._out, plane)
-            return Normalised(self._out, low, low)
+            return Normalised(self._out, low, low, self._counts)
         np.subtract(self._levels, low, out=self._ramp)
         np.multiply(self._ramp, 255, out=self._ramp)
         np.floor_divide(self._ramp, high - low, out=self._ramp)
         np.clip(self._ramp, 0, 255, out=self._ramp)
         np.copyto(self._lut, self._ramp, casting="unsafe")
         cv2.LUT(plane, self._lut, dst=self._out)
-        return Normalised(self._out, low, high)
+        # The new histogram follows from the old one; the picture need not be counted again.
+        self._stretched.fill(0)
+        np.add.at(self._stretched, self._lut, self._counts)
+        return Normalised(self._out, low, high, self._stretched)

@@ -53,18 +53,20 @@ class Views:
         if not palm.found:
             return np.zeros((1, self.height, self.width), np.uint8)
         cuts = cuts or [None]
-        views: list[U8] = []
+        views = np.empty((len(cuts) * len(self._turns), self.height, self.width), np.uint8)
+        count = 0
         seen: set[int | None] = set()
         # Shrinking comes first and once, with the longest piece of arm that any view keeps.
         hand = palm.piece.copy() if cuts[-1] is not None else palm.piece
         erase_arm(hand, cuts[-1])
         x, y, width, height = cv2.boundingRect(hand)
         scale = SMALL / max(width, height)
+        # 0 and 255 from here on, so that resizing keeps what lies between.
         small = resize_mask(
             hand[y : y + height, x : x + width],
             max(1, round(width * scale)),
             max(1, round(height * scale)),
-        )
+        ) * np.uint8(255)
         for cut in reversed(cuts):
             at: int | None = None
             if cut is not None:
@@ -74,10 +76,12 @@ class Views:
                 erase_arm(small, cut._replace(at=at))
             if at not in seen:
                 seen.add(at)
-                views.extend(self._turned(small, turn) for turn in self._turns)
-        return np.stack(views)
+                for turn in self._turns:
+                    self._turned(small, turn, views[count])
+                    count += 1
+        return views[:count]
 
-    def _turned(self, small: U8, turn: float) -> U8:
+    def _turned(self, small: U8, turn: float, out: U8) -> None:
         if turn == 0:
             turned = small
         else:
@@ -96,8 +100,11 @@ class Views:
             turned = self._canvas
         x, y, width, height = cv2.boundingRect(turned)
         if width == 0 or height == 0:
-            return np.zeros((self.height, self.width), np.uint8)
-        return resize_mask(turned[y : y + height, x : x + width], self.width, self.height)
+            out.fill(0)
+            return
+        box = turned[y : y + height, x : x + width]
+        cv2.resize(box, (self.width, self.height), dst=out, interpolation=cv2.INTER_AREA)
+        cv2.threshold(out, 127, 1, cv2.THRESH_BINARY, dst=out)
 
 
 def _trimmed(palm: Palm, radii: float) -> WristCut | None:

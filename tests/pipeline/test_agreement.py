@@ -61,5 +61,5 @@ def test_reset_forgets_without_an_event():
 
 
 def test_more_votes_than_frames_are_refused():
-    with pytest.raises(ValidationError, match=r"votes \\(4\\) must not exceed window \\(3\\)"):
+    with pytest.raises(ValidationError, match=r"votes \(4\) must not exceed window \(3\)"):
         AgreementSettings(votes=4)

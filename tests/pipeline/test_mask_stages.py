@@ -1,12 +1,13 @@
 """Binarise, palm, motion, ROI, wrist and template on drawn masks."""
 
+import cv2
 import numpy as np
 import pytest
 
 from app.config import BinariseSettings, MotionSettings, RoiSettings, WristSettings
 from app.errors import Invalid
 from app.pipeline import WristCut, pack_template, unpack_template
-from app.pipeline.binarise import Binarise
+from app.pipeline.binarise import Binarise, otsu
 from app.pipeline.motion import MotionGate
 from app.pipeline.normalise import Normalised
 from app.pipeline.palm import PalmFinder
@@ -20,7 +21,7 @@ MASK = draw_mask("two", size=(320, 240))
 
 
 def two_colours(mask, hand, wall):
-    return Normalised(np.where(mask == 1, hand, wall).astype(np.uint8), 0, 255)
+    return Normalised.of(np.where(mask == 1, hand, wall).astype(np.uint8))
 
 
 @pytest.mark.parametrize(("hand", "wall"), [(200, 60), (60, 200)])
@@ -39,14 +40,24 @@ def test_polarity_can_be_fixed(polarity, same):
 
 def test_low_contrast_is_no_hand():
     plane = two_colours(MASK, 255, 0).plane
-    binary = Binarise(BinariseSettings(min_contrast=5))(Normalised(plane, 100, 103))
+    binary = Binarise(BinariseSettings(min_contrast=5))(Normalised.of(plane, 100, 103))
     assert binary.contrast == pytest.approx(3)
     assert not binary.mask.any()
 
 
+def test_threshold_is_the_one_of_opencv():
+    plane = np.random.default_rng(0).normal(90, 25, (100, 100))
+    plane[:40] += 90
+    plane = plane.clip(0, 255).astype(np.uint8)
+    expected, _ = cv2.threshold(plane, 0, 1, cv2.THRESH_OTSU)
+    level, difference = otsu(Normalised.of(plane).counts)
+    assert level == expected
+    assert difference == pytest.approx(plane[plane > level].mean() - plane[plane <= level].mean())
+
+
 def test_flat_plane_is_no_hand():
     flat = np.full((50, 50), 9, np.uint8)
-    assert not Binarise(BinariseSettings(min_contrast=0))(Normalised(flat, 9, 9)).mask.any()
+    assert not Binarise(BinariseSettings(min_contrast=0))(Normalised.of(flat, 9, 9)).mask.any()
 
 
 @pytest.mark.parametrize("side", SIDES)

@@ -59,6 +59,7 @@ def test_normalise_stretches_to_the_full_range():
     assert (out.low, out.high) == (40, 119)
     expected = (PLANE.astype(int) - 40) * 255 // 79
     assert np.array_equal(out.plane, expected)
+    assert np.array_equal(out.counts, np.bincount(out.plane.ravel(), minlength=256))
 
 
 def test_normalise_ignores_single_hot_pixels():
