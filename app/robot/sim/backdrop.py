@@ -25,6 +25,8 @@ WALL_TOP = (226, 231, 236)
 WALL_LOW = (184, 192, 202)
 FLOOR = (128, 134, 142)
 """RGB."""
+_WALL = np.linspace(WALL_LOW, WALL_TOP, 256).astype(np.uint8)
+"""From low to high, shape (256, 3)."""
 
 
 class Room(NamedTuple):
@@ -123,8 +125,7 @@ class Backdrop:
         """A wall that grows lighter upwards from where the floor fades into it."""
         rise = affine(self._lens.rise(view), self._columns, self._rows)
         light = np.clip((rise + 0.22) * 1.3, 0.0, 1.0)  # the floor ends a little below the horizon
-        low, top = np.array(WALL_LOW, np.float32), np.array(WALL_TOP, np.float32)
-        return np.asarray((low + light[:, :, None] * (top - low)).astype(np.uint8))
+        return np.asarray(_WALL[(light * 255).astype(np.uint8)])
 
 
 def shade(room: Room, shadow: Picture, scale: float) -> Picture:

@@ -12,7 +12,7 @@ import pybullet
 from numpy.typing import NDArray
 
 from app.robot.models import ModelAssets, ObjectModel
-from app.robot.models.assets import read_stl
+from app.robot.models.assets import read_stl, write_stl
 from app.robot.sim.kinematics import origin_of
 from app.robot.sim.lens import Matrix
 from app.robot.sim.shadow import outline
@@ -20,6 +20,10 @@ from app.robot.sim.world import connect, load_robot, upright
 
 _SKIRT = 0.004
 """m; thickness of the boards that stand for the sides of a table whose top is drawn apart."""
+
+
+_DETAIL = 0.006
+"""m; smaller details of the meshes are not drawn: about a pixel and a half of the scene camera."""
 
 
 class Stage:
@@ -138,6 +142,30 @@ def add_visual(client: int, thing: ObjectModel, own_shapes: bool = True) -> int:
     )
 
 
+def coarsen(corners: NDArray[np.float32], cell: float) -> NDArray[np.float32]:
+    """A mesh (corners, shape (n, 3, 3)) without details smaller than ``cell`` (m).
+
+    Vertex clustering (Rossignac and Borrel 1993): corners in the same cell of a grid become their
+    mean, and triangles that lose a side are left out.
+    """
+    flat = corners.reshape(-1, 3)
+    _, which, count = np.unique(
+        np.floor(flat / cell + 0.5).astype(np.int32),
+        axis=0,
+        return_inverse=True,
+        return_counts=True,
+    )
+    which = which.reshape(-1)
+    means = np.zeros((len(count), 3))
+    np.add.at(means, which, flat)
+    means /= count[:, None]
+    triangles = which.reshape(-1, 3)
+    a, b, c = triangles.T
+    kept = triangles[(a != b) & (b != c) & (c != a)]
+    _, first = np.unique(np.sort(kept, axis=1), axis=0, return_index=True)
+    return np.asarray(means[kept[np.sort(first)]], np.float32)
+
+
 def frame_of(position: Sequence[float], quaternion: Sequence[float]) -> Matrix:
     """A 4x4 frame from Bullet's position and quaternion x, y, z, w."""
     frame = np.eye(4)
@@ -174,9 +202,12 @@ def _load_visuals(
         for part in list(link):
             if part.tag == "collision" or (part.tag == "visual" and not drawn):
                 link.remove(part)
-    for mesh in tree.getroot().iter("mesh"):
-        mesh.set("filename", str(assets.urdf_path.parent / mesh.get("filename", "")))
     with tempfile.TemporaryDirectory(prefix="farhand-") as folder:
+        for number, mesh in enumerate(tree.getroot().iter("mesh")):
+            corners = read_stl(assets.urdf_path.parent / mesh.get("filename", ""))
+            coarse = Path(folder) / f"{number}.stl"
+            coarse.write_bytes(write_stl(coarsen(corners, _DETAIL)))
+            mesh.set("filename", str(coarse))
         path = Path(folder) / "visuals.urdf"
         tree.write(path)
         return load_robot(client, path)

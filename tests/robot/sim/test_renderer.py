@@ -10,11 +10,12 @@ import pytest
 
 from app.errors import CannotStart
 from app.link.messages import ObjectState
-from app.robot.models import ObjectModel
+from app.robot.models import ObjectModel, model_assets
+from app.robot.models.assets import read_stl
 from app.robot.sim.backdrop import Backdrop
 from app.robot.sim.lens import Lens, affine, look_at
 from app.robot.sim.renderer import Renderer
-from app.robot.sim.scenery import thing_outline
+from app.robot.sim.scenery import coarsen, thing_outline
 from app.robot.sim.shadow import Shadow, outline
 
 
@@ -236,3 +237,17 @@ def test_an_outline_keeps_the_corners() -> None:
     corners = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T
     found = outline(np.concatenate([inside, corners]))
     assert {tuple(point) for point in found} == {tuple(point) for point in corners}
+
+
+def test_coarse_meshes_keep_their_shape() -> None:
+    corners = read_stl(model_assets("puma560").urdf_path.parent / "meshes" / "link3.stl")
+    coarse = coarsen(corners, 0.006)
+    assert len(coarse) < len(corners) / 3
+    assert coarse.reshape(-1, 3).min(axis=0) == pytest.approx(
+        corners.reshape(-1, 3).min(axis=0), abs=0.006
+    )
+    assert coarse.reshape(-1, 3).max(axis=0) == pytest.approx(
+        corners.reshape(-1, 3).max(axis=0), abs=0.006
+    )
+    # A grid finer than every detail changes nothing but the order of sums.
+    assert len(coarsen(corners, 1e-6)) == len(np.unique(np.sort(corners, axis=1), axis=0))
