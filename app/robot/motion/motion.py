@@ -99,6 +99,7 @@ class Motion:
         if (reason := self.refusal(action)) is not None:
             raise ValueError(reason)
         self._task = self._task_of(action)
+        self._braking_hard = False
         self.action = action
 
     def release(self) -> None:
@@ -109,11 +110,10 @@ class Motion:
 
     def halt(self) -> None:
         """A stop: come to rest at once, within 200 ms."""
-        if self._braking_hard:
-            return
         self._task = None
-        self._braking_hard = True
-        self._keep_fingers()
+        if not self._braking_hard:
+            self._braking_hard = True
+            self._keep_fingers()
 
     def reset(self, joints: Vector) -> None:
         """Be at rest where the arm really is, at ``joints`` (rad, shape (n,))."""

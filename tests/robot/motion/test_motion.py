@@ -1,0 +1,290 @@
+import random
+
+import numpy as np
+import pytest
+
+from app.config import ArmMotionSettings
+from app.link.actions import (
+    Action,
+    Gripper,
+    Home,
+    JogCartesian,
+    JogJoint,
+    Pose,
+    Sequence,
+    Stop,
+    TurnJoint,
+)
+from app.robot.motion.motion import Motion
+from tests.robot.fakes import DT, FakeArm
+
+
+class Rig:
+    """A motion with a fake arm; every step is checked against every limit."""
+
+    def __init__(self, joints: np.ndarray | None = None) -> None:
+        self.arm = FakeArm(joints)
+        self.motion = Motion(self.arm, ArmMotionSettings(), DT)
+        self.track: list[np.ndarray] = [self.arm.joints.copy()]
+        self.limits: set[str] = set()
+
+    def step(self) -> None:
+        motion, trajectory = self.motion, self.motion.trajectory
+        before = (trajectory.position, trajectory.velocity, trajectory.acceleration)
+        motion.step(self.arm.read())
+        self.arm.move(trajectory.position, trajectory.velocity)
+        self.arm.step()
+        self.track.append(trajectory.position.copy())
+        self.limits |= set(motion.limits)
+        bounds, most = trajectory.limits, trajectory.limits.stop
+        position, velocity, acceleration = before
+        assert (trajectory.position <= bounds.upper + 1e-6).all()
+        assert (trajectory.position >= bounds.lower - 1e-6).all()
+        assert (np.abs(trajectory.velocity) <= most.velocity + 1e-6).all()
+        assert (np.abs(trajectory.acceleration) <= most.acceleration + 1e-6).all()
+        jerk = np.abs(trajectory.acceleration - acceleration) / DT
+        assert (jerk <= most.jerk * 1.001).all()
+        # What is commanded is one smooth curve: position and velocity tell the same story.
+        middle = (trajectory.velocity + velocity) / 2 * DT
+        assert (
+            np.abs(trajectory.position - position - middle) <= most.acceleration * DT**2 / 2 + 1e-9
+        ).all()
+
+    def run(self, seconds: float) -> None:
+        for _ in range(round(seconds / DT)):
+            self.step()
+
+    def finish(self, within: float = 12.0) -> float:
+        """Step until the action has ended; s that it took."""
+        for count in range(round(within / DT)):
+            if not self.motion.busy:
+                return count * DT
+            self.step()
+        raise AssertionError("did not come to rest")
+
+    def do(self, action: Action, seconds: float) -> None:
+        self.motion.begin(action)
+        self.run(seconds)
+        self.motion.release()
+        self.finish()
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("speed", [0.1, -0.1])
+def test_straight_lines_are_straight_and_as_fast_as_asked(axis: int, speed: float) -> None:
+    rig = Rig()
+    start = rig.arm.read().tool
+    linear = [0.0, 0.0, 0.0]
+    linear[axis] = speed
+    rig.motion.begin(JogCartesian(linear=tuple(linear)))
+    rig.run(0.5)
+    before = rig.arm.read().tool.position
+    rig.run(0.5)
+    now = rig.arm.read().tool
+    assert now.position[axis] - before[axis] == pytest.approx(speed * 0.5, rel=0.01)
+    rig.motion.release()
+    assert rig.finish() < 0.3
+    for joints in rig.track:
+        tool = rig.arm.kinematics.forward(joints)
+        off = tool.position - start.position
+        off[axis] = 0.0
+        assert np.abs(off).max() < 1e-4
+        assert abs(abs(tool.orientation @ start.orientation) - 1) < 1e-6
+
+
+def test_turning_about_the_tool_keeps_its_point() -> None:
+    rig = Rig()
+    start = rig.arm.read().tool.position
+    rig.do(JogCartesian(frame="tool", angular=(0.0, 0.0, 0.5)), 1.0)
+    for joints in rig.track:
+        assert np.abs(rig.arm.kinematics.forward(joints).position - start).max() < 1e-4
+
+
+def test_the_tool_frame_is_the_tools() -> None:
+    rig = Rig()
+    start = rig.arm.read().tool.position
+    rig.do(JogCartesian(frame="tool", linear=(0.0, 0.0, 0.1)), 0.5)  # points down at home
+    moved = rig.arm.read().tool.position - start
+    assert moved[2] < -0.04
+    assert np.abs(moved[:2]).max() < 1e-3
+
+
+def test_a_straight_line_ends_before_a_limit_and_is_straight_to_the_end() -> None:
+    rig = Rig()
+    start = rig.arm.read().tool.position
+    rig.do(JogCartesian(linear=(0.0, 0.0, 0.5)), 3.0)
+    assert "a joint is at its limit" in rig.limits or any("singular" in x for x in rig.limits)
+    for joints in rig.track:
+        off = rig.arm.kinematics.forward(joints).position - start
+        assert np.abs(off[:2]).max() < 1e-3
+
+
+def test_a_line_out_of_reach_slows_down_and_stops() -> None:
+    rig = Rig()
+    rig.do(JogCartesian(linear=(0.5, 0.0, 0.0)), 4.0)
+    assert any("singular" in text for text in rig.limits)
+
+
+def test_a_jog_into_a_limit_stops_there_and_leaves_it_again() -> None:
+    rig = Rig()
+    rig.do(JogJoint(joint=3, velocity=4.0), 4.0)
+    upper = rig.arm.description.joints[2].upper
+    assert upper - 0.05 < rig.arm.joints[2] <= upper
+    assert "joint3 is at its upper limit" in rig.limits
+    assert "joint3 turns at most at 2.02 rad/s" in rig.limits
+    rig.do(JogJoint(joint=3, velocity=-1.0), 0.5)
+    assert rig.arm.joints[2] < upper - 0.2
+
+
+@pytest.mark.parametrize("angle", [0.5, -0.25, 1e-4, 0.0])
+def test_a_turn_ends_exactly_at_its_angle(angle: float) -> None:
+    rig = Rig()
+    rig.motion.begin(TurnJoint(joint=1, angle=angle))
+    rig.finish()
+    expected = rig.arm.home + np.eye(6)[0] * angle
+    assert np.abs(rig.arm.joints - expected).max() < 1e-9
+
+
+def test_a_turn_past_the_limit_is_clipped_and_said() -> None:
+    rig = Rig()
+    rig.motion.begin(TurnJoint(joint=5, angle=6.0))
+    rig.finish()
+    assert rig.arm.joints[4] == pytest.approx(1.7453)
+    assert "joint5 ends at its upper limit, 3.102 rad short" in rig.limits
+
+
+def test_poses_are_reached_and_unknown_ones_refused() -> None:
+    rig = Rig()
+    rig.motion.begin(Pose(name="left"))
+    rig.finish()
+    assert rig.arm.joints == pytest.approx(rig.arm.description.poses["left"])
+    reason = rig.motion.refusal(Sequence(steps=(Home(), Pose(name="moon"))))
+    assert reason is not None
+    assert reason.startswith("step 2: this robot has no pose 'moon'; it has: home, inspect,")
+
+
+def test_letting_go_on_the_way_comes_to_rest_on_the_way() -> None:
+    rig = Rig()
+    rig.motion.begin(TurnJoint(joint=1, angle=2.0))
+    rig.run(0.4)
+    rig.motion.release()
+    assert rig.finish() < 0.45
+    assert 0.05 < rig.arm.joints[0] - rig.arm.home[0] < 1.0
+
+
+@pytest.mark.parametrize("joint", range(1, 7))
+@pytest.mark.parametrize("after", [0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5])
+def test_a_stop_takes_at_most_200_ms_from_any_state(joint: int, after: float) -> None:
+    rig = Rig()
+    rig.motion.begin(JogJoint(joint=joint, velocity=4.3))
+    rig.run(after)
+    rig.motion.halt()
+    assert rig.finish() <= 0.2
+
+
+def test_a_stop_in_a_straight_line_takes_at_most_200_ms() -> None:
+    for count in range(10, 200, 10):
+        rig = Rig()
+        rig.motion.begin(JogCartesian(linear=(0.3, 0.3, -0.3)))
+        rig.run(count * DT)
+        rig.motion.halt()
+        assert rig.finish() <= 0.2
+
+
+def test_a_sequence_runs_step_by_step() -> None:
+    rig = Rig()
+    rig.motion.begin(
+        Sequence(
+            steps=(
+                TurnJoint(joint=1, angle=0.2),
+                JogJoint(joint=1, velocity=0.5, duration=0.5),
+                JogCartesian(linear=(0.0, 0.0, 0.1), duration=0.4),
+                Gripper(width=0.0),
+                Home(),
+            )
+        )
+    )
+    rig.finish()
+    turned = max(joints[0] for joints in rig.track) - rig.arm.home[0]
+    assert turned == pytest.approx(0.2 + 0.25, abs=0.05)
+    assert rig.arm.width == 0.0
+    assert rig.arm.joints == pytest.approx(rig.arm.home)
+
+
+def test_letting_go_ends_a_sequence() -> None:
+    rig = Rig()
+    jog = JogCartesian(linear=(0.0, 0.0, 0.1), duration=5.0)
+    rig.motion.begin(Sequence(steps=(jog, TurnJoint(joint=1, angle=1.0))))
+    rig.run(0.5)
+    rig.motion.release()
+    assert rig.finish() < 0.4
+    assert rig.arm.joints[0] == pytest.approx(rig.arm.home[0], abs=0.01)
+
+
+def test_a_stop_in_a_sequence_asks_for_a_stop() -> None:
+    rig = Rig()
+    rig.motion.begin(Sequence(steps=(TurnJoint(joint=1, angle=0.1), Stop(), Home())))
+    while not rig.motion.wants_stop:
+        rig.step()
+    assert rig.arm.joints[0] == pytest.approx(rig.arm.home[0] + 0.1)
+
+
+def test_fingers_let_go_on_the_way_stay_there() -> None:
+    rig = Rig()
+    rig.do(Gripper(width=0.0), 0.2)
+    rig.run(1.0)
+    assert 0.03 < rig.arm.width < 0.06
+
+
+def test_fingers_that_hold_something_go_on_holding() -> None:
+    rig = Rig()
+    rig.arm.blocked_at = 0.045
+    rig.motion.begin(Gripper(width=0.0))
+    rig.finish()
+    rig.motion.halt()
+    rig.run(0.5)
+    assert rig.arm.wanted_width == 0.0
+
+
+def test_a_new_action_needs_the_arm_at_rest() -> None:
+    rig = Rig()
+    rig.motion.begin(Home())
+    with pytest.raises(ValueError, match="begins with the arm at rest"):
+        rig.motion.begin(Home())
+
+
+def random_action(rng: random.Random) -> Action:
+    def speed(most: float) -> float:
+        return rng.choice([rng.uniform(-most, most), most, -most, 0.0])
+
+    kind = rng.randrange(6)
+    if kind <= 1:
+        return JogJoint(joint=rng.randint(1, 6), velocity=speed(4.3))
+    if kind <= 3:
+        return JogCartesian(
+            frame=rng.choice(["base", "tool"]),
+            linear=(speed(1.0), speed(1.0), speed(1.0)),
+            angular=tuple(rng.choice([0.0, speed(3.15)]) for _ in range(3)),
+        )
+    if kind == 4:
+        return TurnJoint(joint=rng.randint(1, 6), angle=speed(6.3))
+    return Pose(name=rng.choice(["home", "ready", "left", "right", "tray", "inspect"]))
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.timeout(300)
+def test_no_limit_is_ever_broken_whatever_is_asked(seed: int) -> None:
+    rng = random.Random(seed)
+    rig = Rig()
+    for _ in range(250):
+        action = random_action(rng)
+        if not rig.motion.busy:
+            rig.motion.begin(action)
+        for _ in range(rng.randint(1, 30)):
+            rig.step()
+        what = rng.random()
+        if what < 0.5:
+            rig.motion.release()
+        elif what < 0.8:
+            rig.motion.halt()
+            assert rig.finish() <= 0.2
