@@ -15,6 +15,7 @@ ignored.
 """
 
 import json
+import lzma
 import os
 import re
 import shutil
@@ -56,17 +57,26 @@ def read_set(source: Path) -> list[NewGesture]:
     Raises:
         Invalid: missing, damaged, or not exactly in the format; says where and why.
     """
-    if source.is_dir():
-        return _parse(_folder_reader(source))
     if not source.exists():
         raise Invalid(f"{source} does not exist; name a folder with {INDEX} in it, or a zip of one")
-    if source.stat().st_size > ZIP_MAX_BYTES:
-        raise Invalid(f"{source} is larger than {ZIP_MAX_BYTES >> 20} MiB")
     try:
+        if source.is_dir():
+            return _parse(_folder_reader(source))
+        if source.stat().st_size > ZIP_MAX_BYTES:
+            raise Invalid(f"{source} is larger than {ZIP_MAX_BYTES >> 20} MiB")
         with zipfile.ZipFile(source) as archive:
             return _parse(_zip_reader(archive))
-    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError) as error:
-        raise Invalid(f"{source} is neither a folder nor a readable zip file: {error}") from error
+    except (zipfile.BadZipFile, zlib.error, lzma.LZMAError, NotImplementedError) as error:
+        raise _unreadable(source, error) from error
+    except (OSError, EOFError, RuntimeError, ValueError) as error:
+        # What zipfile raises for passwords, impossible offsets and names in no encoding, and the
+        # file system for names that are too long or files that may not be read.
+        raise _unreadable(source, error) from error
+
+
+def _unreadable(source: Path, error: Exception) -> Invalid:
+    reason = " ".join(str(error).split())
+    return Invalid(f"{source} is neither a readable folder nor a readable zip file: {reason}")
 
 
 def write_set(gestures: Iterable[NewGesture], target: Path) -> None:

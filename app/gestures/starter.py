@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import Invalid
-from app.gestures.hand.pose import HandPose, jitter
-from app.gestures.hand.poses import POSES
+from app.gestures.hand.pose import jitter
+from app.gestures.hand.poses import ALSO, POSES
 from app.gestures.hand.render import HandLook, HandView, render_hand
 from app.gestures.hand.skin import TONES
 from app.gestures.records import TEMPLATE_HEIGHT, TEMPLATE_WIDTH, NewGesture
@@ -49,28 +49,24 @@ class _Variant:
 
 VARIANTS = (
     _Variant(),
-    _Variant(turn=-0.14),
-    _Variant(turn=0.14),
-    _Variant(turn=-0.24, jitter=0.03),
-    _Variant(turn=0.24, jitter=0.03, skin="light"),
-    _Variant(length=225.0, jitter=0.05),
-    _Variant(length=315.0, jitter=0.05, skin="tan"),
-    _Variant(turn=-0.07, jitter=0.07, skin="brown"),
-    _Variant(turn=0.07, jitter=0.07),
+    _Variant(turn=-0.12),
+    _Variant(turn=0.12),
+    _Variant(length=225.0, jitter=0.04),
+    _Variant(length=315.0, jitter=0.04, skin="tan"),
+    _Variant(turn=-0.06, jitter=0.06, skin="light"),
+    _Variant(turn=0.06, jitter=0.06),
 )
-"""One sample each: turns, sizes, and what differs between people."""
+"""One sample each: small turns, sizes, and what differs between people. The matcher itself tries
+larger turns."""
 
 
-def starter_pictures(pose: HandPose, seed: int) -> list[NDArray[np.uint8]]:
-    """The pictures of a gesture that its samples are made of, 640x480 BGR.
-
-    Args:
-        pose: The gesture's.
-        seed: The same seed gives the same pictures.
-    """
-    generator = np.random.default_rng(seed)
+def starter_pictures(name: str) -> list[NDArray[np.uint8]]:
+    """The pictures of a gesture that its samples are made of, 640x480 BGR; always the same."""
+    generator = np.random.default_rng(list(ACTIONS).index(name))
+    shown = [(POSES[name], variant) for variant in VARIANTS]
+    shown += [(pose, variant) for pose in ALSO.get(name, ()) for variant in VARIANTS[:3]]
     pictures = []
-    for variant in VARIANTS:
+    for pose, variant in shown:
         view = HandView(variant.length, turn=variant.turn)
         look = HandLook(skin=TONES[variant.skin])
         varied = jitter(pose, variant.jitter, generator)
@@ -85,9 +81,9 @@ def starter_set(extract: Extract) -> list[NewGesture]:
         Invalid: ``extract`` gives something that is not a template.
     """
     gestures = []
-    for seed, (name, action) in enumerate(ACTIONS.items()):
+    for name, action in ACTIONS.items():
         templates = []
-        for picture in starter_pictures(POSES[name], seed):
+        for picture in starter_pictures(name):
             done, data = cv2.imencode(".png", picture)
             assert done
             template = np.asarray(extract(data.tobytes()))

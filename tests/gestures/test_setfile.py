@@ -140,6 +140,7 @@ def test_the_example_is_read(folder: Callable[[str], Path]) -> None:
         ("a/01.png", "", "is not a plain path"),
         ("a/01.png", "a\\u0000", "is not a plain path"),
         ("a/01.png", "a", "is missing in"),
+        ("a/01.png", "a" * 5000, "neither a readable folder nor"),
         ("a/01.png", "gestures.toml", "sample 'gestures.toml' is not a PNG file"),
         ('"home"', '"hme"', "gesture 1 (a): bad action: "),
         ('type = "home"', 'type = "home", x = 1', "bad action: home.x: Extra inputs"),
@@ -179,7 +180,7 @@ def test_missing_sources_say_what_would_be_right(tmp_path: Path) -> None:
     assert "does not exist; name a folder with gestures.toml in it" in refusal(tmp_path / "no")
     assert "gestures.toml is missing in" in refusal(tmp_path)
     (tmp_path / "x.zip").write_bytes(b"nonsense")
-    assert "neither a folder nor a readable zip file" in refusal(tmp_path / "x.zip")
+    assert "neither a readable folder nor a readable zip file" in refusal(tmp_path / "x.zip")
     with zipfile.ZipFile(tmp_path / "y.zip", "w") as archive:
         archive.writestr("readme.txt", "nothing")
     assert "gestures.toml is missing in the zip file" in refusal(tmp_path / "y.zip")
@@ -212,7 +213,7 @@ def test_a_zip_with_a_password_is_refused(tmp_path: Path) -> None:
             data[start + place] |= 1
             start = data.find(mark, start + 4)
     path.write_bytes(data)
-    assert "neither a folder nor a readable zip file" in refusal(path)
+    assert "neither a readable folder nor a readable zip file" in refusal(path)
 
 
 STARTER_INDEX = (STARTER / "gestures.toml").read_text()

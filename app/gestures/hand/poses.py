@@ -25,6 +25,8 @@ _TUCKED = Thumb(spread=0.55, lift=0.55, mcp=0.95, ip=0.85)
 """Over the palm, fingers straight."""
 _OUT = Thumb(spread=1.02, lift=0.12, mcp=-0.30, ip=-0.18)
 """Away from the hand."""
+_ASIDE = Thumb(spread=0.86, lift=0.12, mcp=-0.14, ip=-0.06)
+"""Half way out, as in a hand that is opened without effort."""
 
 RELAXED = HandPose(
     Finger(0.30, 0.35, 0.2, 0.05),
@@ -45,6 +47,15 @@ POSES: dict[str, HandPose] = {
     "open": HandPose(_up(0.06), _FOLDED[1], _FOLDED[2], _FOLDED[3], _OUT),
     "close": HandPose(*_FOLDED, _ACROSS),
     "home": HandPose(_FOLDED[0], _FOLDED[1], _FOLDED[2], _up(-0.38), _OUT),
-    "stop": HandPose(_up(0.26), _up(0.05), _up(-0.16), _up(-0.40), _OUT),
+    "stop": HandPose(_up(0.22), _up(0.05), _up(-0.13), _up(-0.36), _ASIDE),
 }
 """By the name of the starter gesture."""
+
+ALSO: dict[str, tuple[HandPose, ...]] = {
+    "stop": (
+        HandPose(_up(0.28), _up(0.05), _up(-0.17), _up(-0.44), _OUT),
+        HandPose(_up(0.12), _up(0.02), _up(-0.08), _up(-0.24), _ASIDE),
+        HandPose(_up(0.10), _up(0.02), _up(-0.06), _up(-0.18), Thumb(0.66, 0.15, -0.04, -0.02)),
+    ),
+}
+"""Other ways to show a gesture that people use; to stop must work however the hand is opened."""
