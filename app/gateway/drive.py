@@ -6,6 +6,8 @@ from app.gateway.numbers import Counter
 from app.link.actions import Action, Stop
 from app.link.messages import Command, State, StopRequest
 
+_AGAIN = "show no gesture for half a second, then a new one"
+
 
 @dataclass(frozen=True)
 class Lease:
@@ -125,9 +127,7 @@ class Driver:
             case "disarmed":
                 return "the robot is not armed"
             case "holding":
-                because = f" ({state.reason})" if state.reason else ""
-                return (
-                    f"the robot holds still{because}: show no gesture for half a second, "
-                    "then a new one"
-                )
+                reason = state.reason or "it was stopped gently"
+                how = "" if "show no gesture" in reason else f": {_AGAIN}"
+                return f"the robot holds still: {reason}{how}"
         return None if state.armed else "the robot is not armed"

@@ -8,6 +8,7 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from importlib.metadata import PackageNotFoundError, version
 
 from app.config import Settings
+from app.gateway.clip import Clip
 from app.gateway.gallery import LiveGallery, open_store
 from app.gateway.lease_keeper import check_reply
 from app.gateway.metrics import Metrics
@@ -25,6 +26,9 @@ log = logging.getLogger(__name__)
 LINK_THREADS = 4
 STOP_THREADS = 4
 """A stop never waits for a thread that a silent robot keeps busy."""
+
+
+CONFIRM_RESET_S = 0.2
 
 
 def package_version() -> str:
@@ -59,6 +63,7 @@ class Hub:
         self.holds = Counter()
         self.sessions: set[OperatorSession] = set()
         self.relay = Relay(robot, lambda name: self.metrics.pictures.labels(name).inc())
+        self.clip = Clip(settings.data_dir)
         self.closing = asyncio.Event()
         self._link_threads = ThreadPoolExecutor(LINK_THREADS, "link")
         self._stop_threads = ThreadPoolExecutor(STOP_THREADS, "stop")
@@ -89,7 +94,7 @@ class Hub:
             stack.callback(images.shutdown, wait=False, cancel_futures=True)
             viser: ViserScene | None = None
             if settings.gateway.viser:
-                viser = await asyncio.to_thread(ViserScene, robot)
+                viser = ViserScene(robot)
                 stack.push_async_callback(asyncio.to_thread, viser.close)
             hub = cls(settings, store, gallery, robot, images, viser)
             stack.push_async_callback(hub._close)
@@ -142,6 +147,8 @@ class Hub:
             RobotUnavailable: no answer came in time.
         """
         check_reply(await self.ask(LeaseRequest(kind="reset", holder=source[:80])))
+        # What is told next should show it already.
+        await asyncio.to_thread(self.robot.wait_newer, CONFIRM_RESET_S)
 
     async def gallery_changed(self) -> None:
         """Read the gestures again if they changed, and tell every session."""

@@ -2,9 +2,6 @@
 
 import asyncio
 import logging
-import os
-import tempfile
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
@@ -20,9 +17,6 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 router = APIRouter()
-
-CLIP_FILE = "operator.webm"
-_clip_lock = asyncio.Lock()
 
 
 @router.get("/api/health", tags=["server"], summary="Is the server alive?")
@@ -82,35 +76,10 @@ async def metrics(request: Request) -> Response:
 async def operator_clip(request: Request) -> FileResponse:
     """A drawn hand that shows the starter gestures; made once and kept in the data folder."""
     hub: Hub = request.app.state.hub
-    path = hub.settings.data_dir / f"{hub.version}-{CLIP_FILE}"
-    async with _clip_lock:
-        if not path.is_file():
-            await asyncio.to_thread(_make_clip, path)
+    path = await hub.clip.path()
     return FileResponse(
         path, media_type="video/webm", headers={"Cache-Control": "private, max-age=3600"}
     )
-
-
-@router.get("/api/synthetic/operator.json", tags=["server"], summary="What the operator shows")
-async def operator_captions() -> list[dict[str, Any]]:
-    """When which gesture is held still in the video: ``[{"start_s", "end_s", "gesture"}]``."""
-    from app.gestures.synthetic import operator_captions as captions
-
-    return [caption._asdict() for caption in await asyncio.to_thread(captions)]
-
-
-def _make_clip(path: Path) -> None:
-    """Write the clip beside ``path`` and move it there whole."""
-    from app.gestures.synthetic import operator_clip
-
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, draft = tempfile.mkstemp(dir=path.parent, prefix=".clip-", suffix=".webm")
-    os.close(handle)
-    try:
-        operator_clip(Path(draft))
-        Path(draft).replace(path)
-    finally:
-        Path(draft).unlink(missing_ok=True)
 
 
 @router.get("/openapi.json", include_in_schema=False)

@@ -156,13 +156,11 @@ class RobotPort:
         """Process id of our node."""
         return None if self._process is None else self._process.pid
 
-    def wait_ready(self, timeout_s: float) -> bool:
-        """Wait for the first state and the description; False when it takes too long."""
+    def wait_newer(self, timeout_s: float) -> bool:
+        """Wait for a state that comes after this call; False when none does."""
+        since = time.monotonic()
         with self._changed:
-            return self._changed.wait_for(
-                lambda: self._ending.is_set() or (self.online and self._description is not None),
-                timeout_s,
-            )
+            return self._changed.wait_for(lambda: (self._state_at or 0.0) > since, timeout_s)
 
     # Asking
 

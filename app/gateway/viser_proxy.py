@@ -17,6 +17,7 @@ from websockets.exceptions import ConnectionClosed, WebSocketException
 from websockets.typing import Subprotocol
 
 from app.errors import WorldError
+from app.gateway.errors import error_response
 
 if TYPE_CHECKING:
     from app.gateway.hub import Hub
@@ -27,6 +28,7 @@ router = APIRouter(include_in_schema=False)
 
 MAX_MESSAGE_BYTES = 50 << 20
 """viser's own limit."""
+START_WAIT_S = 20.0
 _FORWARDED = ("content-type", "content-encoding", "etag", "last-modified")
 
 
@@ -34,6 +36,20 @@ class ViewerUnavailable(WorldError):
     """The 3D view is off or does not answer."""
 
     default_code = "viewer_unavailable"
+
+
+async def _port(hub: "Hub") -> int:
+    """The port of viser, which may still be starting.
+
+    Raises:
+        ViewerUnavailable: it is switched off, or takes too long to start.
+    """
+    if hub.viser is None:
+        raise ViewerUnavailable("the 3D view is switched off (setting gateway.viser)")
+    port = await asyncio.to_thread(hub.viser.wait_port, START_WAIT_S)
+    if port is None:
+        raise ViewerUnavailable("the 3D view is still starting; try again")
+    return port
 
 
 @router.get("/viser")
@@ -45,11 +61,9 @@ async def to_page() -> RedirectResponse:
 @router.get("/viser/{path:path}")
 async def viser_page(request: Request, path: str) -> Response:
     """Fetch viser's page, which is one file."""
-    hub: Hub = request.app.state.hub
-    if hub.viser is None:
-        raise ViewerUnavailable("the 3D view is switched off (setting gateway.viser)")
+    port = await _port(request.app.state.hub)
     wanted = {"Accept-Encoding": request.headers.get("accept-encoding", "identity")}
-    url = httpx.URL(scheme="http", host="127.0.0.1", port=hub.viser.port, path=f"/{path}")
+    url = httpx.URL(scheme="http", host="127.0.0.1", port=port, path=f"/{path}")
     try:
         async with (
             httpx.AsyncClient(timeout=10, trust_env=False, verify=False) as client,
@@ -68,14 +82,15 @@ async def viser_page(request: Request, path: str) -> Response:
 @router.websocket("/viser/")
 async def viser_socket(socket: WebSocket) -> None:
     """Carry messages both ways until either side closes."""
-    hub: Hub = socket.app.state.hub
-    if hub.viser is None:
-        await socket.close(1013)
+    try:
+        port = await _port(socket.app.state.hub)
+    except ViewerUnavailable as error:
+        await socket.send_denial_response(error_response(error))
         return
     offered = [Subprotocol(name) for name in socket.scope.get("subprotocols", [])]
     try:
         upstream = await connect(
-            f"ws://127.0.0.1:{hub.viser.port}/",
+            f"ws://127.0.0.1:{port}/",
             subprotocols=offered or None,
             compression=None,
             max_size=MAX_MESSAGE_BYTES,
@@ -86,7 +101,8 @@ async def viser_socket(socket: WebSocket) -> None:
         )
     except (OSError, WebSocketException, TimeoutError) as error:
         log.warning("the 3D view does not answer: %s", error)
-        await socket.close(1013)
+        away = ViewerUnavailable("the 3D view does not answer")
+        await socket.send_denial_response(error_response(away))
         return
     async with upstream:
         await socket.accept(upstream.subprotocol)

@@ -1,21 +1,25 @@
 """The live 3D view: the arm from its own URDF, the things around it, moved by the robot's states.
 
-A thread follows the robot and updates the scene only while somebody looks. viser's own server runs
-in a further thread; a failure in either shows in the log and stops nothing else.
+A thread loads viser (which takes seconds, and nobody waits for it), follows the robot and updates
+the scene only while somebody looks. viser's own server runs in a further thread; a failure in
+either shows in the log and stops nothing else.
 """
 
 import contextlib
 import io
 import logging
 import threading
-from typing import Any
+import time
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import viser
-from viser.extras import ViserUrdf
 
 from app.gateway.robot_port import RobotPort
 from app.link.messages import Description, ObjectDescription, ObjectState, State
+
+if TYPE_CHECKING:
+    import viser
+    from viser.extras import ViserUrdf
 
 log = logging.getLogger(__name__)
 
@@ -42,9 +46,8 @@ class ViserScene:
 
     def __init__(self, robot: RobotPort) -> None:
         self._robot = robot
-        with _quiet():
-            self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-        self.port: int = self._server.get_port()
+        self._server: viser.ViserServer | None = None
+        self._ready = threading.Event()
         self._ending = threading.Event()
         self._described: Description | None = None
         self._urdf: ViserUrdf | None = None
@@ -52,42 +55,64 @@ class ViserScene:
         self._handles: list[Any] = []
         self._objects: dict[str, Any] = {}
         self._shown: int | None = None
-        self._dress()
         self._thread = threading.Thread(target=self._run, name="viser-scene", daemon=True)
         self._thread.start()
+
+    def wait_port(self, timeout_s: float) -> int | None:
+        """Wait for viser to be there: its port, or None when it takes too long. Blocks."""
+        if not self._ready.wait(timeout_s) or self._server is None:
+            return None
+        port: int = self._server.get_port()
+        return port
+
+    @property
+    def shown_tick(self) -> int | None:
+        """Tick of the state that the scene shows."""
+        return self._shown
 
     def close(self) -> None:
         """End the thread and the server."""
         self._ending.set()
         self._thread.join(timeout=1.0)
-        with _quiet():
-            self._server.stop()
+        if self._server is not None:
+            with _quiet():
+                self._server.stop()
 
-    def _dress(self) -> None:
-        """What does not depend on the robot: light, ground, the first view, no panels."""
-        server = self._server
+    def _start(self) -> None:
+        import viser
+
+        with _quiet():
+            server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        # What does not depend on the robot: ground, the first view, no panels.
         server.gui.configure_theme(show_logo=False, show_share_button=False)
         server.scene.set_up_direction("+z")
         server.scene.world_axes.visible = False
         server.initial_camera.position = CAMERA_POSITION
         server.initial_camera.look_at = CAMERA_LOOK_AT
         server.initial_camera.up = (0.0, 0.0, 1.0)
-        server.initial_camera.fov = np.radians(45.0)
+        server.initial_camera.fov = float(np.radians(45.0))
         background = np.full((2, 2, 3), [round(255 * part) for part in BACKGROUND], np.uint8)
         server.scene.set_background_image(background)
+        self._server = server
 
     def _run(self) -> None:
         while not self._ending.wait(PERIOD_S):
             try:
+                if self._server is None:
+                    self._start()
+                    self._ready.set()
                 self._follow()
             except Exception:
                 log.exception("the 3D view could not be updated")
                 self._ending.wait(RETRY_S)
 
     def _follow(self) -> None:
+        assert self._server is not None
         description, state = self._robot.description, self._robot.state
         if description is not None and description != self._described:
-            self._build(description)
+            started = time.monotonic()
+            self._build(self._server, description)
+            log.debug("3D scene built in %.1f s", time.monotonic() - started)
         if state is None or self._urdf is None or state.tick == self._shown:
             return
         # The first state is shown even when nobody looks: whoever comes next starts from there.
@@ -97,7 +122,9 @@ class ViserScene:
             self._update(state)
         self._shown = state.tick
 
-    def _build(self, description: Description) -> None:
+    def _build(self, server: "viser.ViserServer", description: Description) -> None:
+        from viser.extras import ViserUrdf
+
         from app.robot.models import model_assets
 
         for handle in self._handles:
@@ -106,26 +133,26 @@ class ViserScene:
             self._urdf.remove()
         self._handles, self._objects, self._shown = [], {}, None
         assets = model_assets(description.model)
-        self._urdf = ViserUrdf(self._server, assets.urdf_path, root_node_name="/robot")
+        self._urdf = ViserUrdf(server, assets.urdf_path, root_node_name="/robot")
         arm = {joint.name: index for index, joint in enumerate(description.joints)}
         self._order = [arm.get(name) for name in self._urdf.get_actuated_joint_names()]
         self._handles.append(
-            self._server.scene.add_grid(
+            server.scene.add_grid(
                 "/grid", width=6.0, height=6.0, cell_size=0.25, section_size=1.0,
                 cell_color=(170, 178, 188), section_color=(140, 150, 162),
             )
         )  # fmt: skip
         for thing in description.objects:
-            self._objects[thing.name] = self._add(thing)
+            self._objects[thing.name] = self._add(server, thing)
         self._handles += self._objects.values()
         self._described = description
 
-    def _add(self, thing: ObjectDescription) -> Any:
+    def _add(self, server: "viser.ViserServer", thing: ObjectDescription) -> Any:
         red, green, blue, alpha = thing.colour
         colour = (round(red * 255), round(green * 255), round(blue * 255))
         name = f"/objects/{thing.name}"
         opacity = None if alpha >= 1.0 else alpha
-        scene = self._server.scene
+        scene = server.scene
         if thing.shape == "box":
             return scene.add_box(name, color=colour, dimensions=thing.size, opacity=opacity)
         diameter, _, height = thing.size

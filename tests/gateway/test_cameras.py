@@ -1,0 +1,111 @@
+"""The relay of camera pictures, with a camera that counts what it publishes."""
+
+import threading
+import time
+
+import pytest
+from websockets.exceptions import InvalidStatus
+
+from app.link.header import HEADER_SIZE, FrameHeader
+from tests.gateway.running import Running, StandIn, StandInCamera, wait_for
+
+
+def test_pictures_are_made_only_while_somebody_watches(server: Running, node: StandIn) -> None:
+    with StandInCamera(node, "wrist") as camera:
+        time.sleep(0.2)
+        assert camera.published == 0
+        with server.socket("/ws/camera/wrist") as viewer:
+            message = viewer.recv(timeout=10)
+            assert message[HEADER_SIZE : HEADER_SIZE + 2] == b"\xff\xd8"
+        wait_for(lambda: not camera.watched, "the watch to end")
+        count = camera.published
+        time.sleep(0.2)
+        assert camera.published == count
+
+
+def test_all_viewers_share_one_watch_and_a_slow_one_slows_nobody(
+    server: Running, node: StandIn
+) -> None:
+    with StandInCamera(node, "scene", size=200_000) as camera:
+        # Reads nothing at all, with as little room on the way as can be.
+        with (
+            server.socket("/ws/camera/scene", max_queue=1) as slow,
+            server.socket("/ws/camera/scene") as quick,
+        ):
+            first = FrameHeader.unpack(quick.recv(timeout=10)).sequence
+            started = time.monotonic()
+            seen = [first]
+            while seen[-1] < first + 60:
+                seen.append(FrameHeader.unpack(quick.recv(timeout=10)).sequence)
+            assert time.monotonic() - started < 5
+            assert seen == sorted(set(seen))
+            # What the slow one gets now is new, not a backlog.
+            for _ in range(40):
+                newest = FrameHeader.unpack(slow.recv(timeout=10)).sequence
+            assert newest > first + 45
+        assert camera.published > 0
+
+
+def test_a_single_picture_is_fresh(server: Running, node: StandIn) -> None:
+    with StandInCamera(node, "wrist"):
+        for _ in range(2):
+            answer = server.http.get("/api/cameras/wrist.jpg")
+            assert answer.status_code == 200
+            assert answer.content.startswith(b"\xff\xd8")
+            assert answer.headers["cache-control"] == "no-store"
+
+
+def test_no_picture_in_time_is_told(server: Running) -> None:
+    started = time.monotonic()
+    answer = server.http.get("/api/cameras/wrist.jpg")
+    assert 1.5 < time.monotonic() - started < 6
+    assert answer.status_code == 503
+    assert answer.json()["error"]["code"] == "no_picture"
+
+
+def test_mjpeg_goes_on_until_the_viewer_or_the_server_ends(server: Running, node: StandIn) -> None:
+    with StandInCamera(node, "wrist"):
+        parts = 0
+        with server.http.stream("GET", "/api/cameras/wrist.mjpeg") as answer:
+            assert answer.headers["content-type"].startswith("multipart/x-mixed-replace")
+            buffer = b""
+            for chunk in answer.iter_raw():
+                buffer += chunk
+                parts = buffer.count(b"Content-Type: image/jpeg\r\nContent-Length: ")
+                if parts >= 3:
+                    break
+        assert parts >= 3
+        wait_for(lambda: server.hub.relay.viewers == 0, "the viewer to be gone")
+
+        ended = threading.Event()
+
+        def watch() -> None:
+            with server.http.stream("GET", "/api/cameras/wrist.mjpeg") as stream:
+                for _ in stream.iter_raw():
+                    pass
+            ended.set()
+
+        thread = threading.Thread(target=watch)
+        thread.start()
+        wait_for(lambda: server.hub.relay.viewers == 1, "the viewer")
+        server.hub.closing.set()
+        assert ended.wait(10)
+        thread.join()
+
+
+@pytest.mark.parametrize("name", ["nose", "..", "wrist%2F"])
+def test_an_unknown_camera_is_refused(server: Running, name: str) -> None:
+    for suffix in ("jpg", "mjpeg"):
+        answer = server.http.get(f"/api/cameras/{name}.{suffix}")
+        assert answer.status_code == 404
+    with pytest.raises(InvalidStatus) as refused:
+        server.socket(f"/ws/camera/{name}")
+    assert refused.value.response.status_code in (403, 404)
+
+
+def test_what_a_viewer_sends_is_ignored(server: Running, node: StandIn) -> None:
+    with StandInCamera(node, "wrist"), server.socket("/ws/camera/wrist") as viewer:
+        viewer.send("hello")
+        viewer.send(b"\x00")
+        viewer.recv(timeout=10)
+        viewer.recv(timeout=10)
