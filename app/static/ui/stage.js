@@ -4,6 +4,7 @@ import { texts } from "../texts/en.js";
 import { button, el, setText } from "./dom.js";
 
 const OLD_MS = 500; // from here on the age of a picture is shown
+const LONG_AWAY_MS = 1500; // a server that starts takes longer
 const CAMERAS = ["wrist", "scene"];
 
 /** One robot camera: draws pictures, shows their age. Opens nothing itself; it is given a feed. */
@@ -75,20 +76,23 @@ class CameraView {
     }
 }
 
+const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
+
 /** How this browser draws in three dimensions: "fast", "slow" (without a GPU) or "none". */
 function drawing3d() {
-    const works = (options) => {
-        try {
-            const context = document.createElement("canvas").getContext("webgl2", options);
-            const ending = context && context.getExtension("WEBGL_lose_context");
-            if (ending) ending.loseContext();
-            return context !== null;
-        } catch {
-            return false;
-        }
-    };
-    if (works({ failIfMajorPerformanceCaveat: true })) return "fast";
-    return works({}) ? "slow" : "none";
+    try {
+        const context = document.createElement("canvas").getContext("webgl2");
+        if (!context) return "none";
+        const names = context.getExtension("WEBGL_debug_renderer_info");
+        const renderer = context.getParameter(
+            names ? names.UNMASKED_RENDERER_WEBGL : context.RENDERER,
+        );
+        const ending = context.getExtension("WEBGL_lose_context");
+        if (ending) ending.loseContext();
+        return SOFTWARE.test(renderer) ? "slow" : "fast";
+    } catch {
+        return "none";
+    }
 }
 
 /** The 3D view in its frame: loaded when first seen, and again when the server came back. */
@@ -244,15 +248,20 @@ export function stage(element, store, { feeds, onFrame, memory }) {
     }, 200);
 
     let was = null;
-    let session = null;
-    store.watch(["connection", "hello"], (state) => {
-        const name = state.connection.state;
-        if (name !== was) update();
+    let lostAt = null;
+    store.watch(["connection"], ({ connection }) => {
+        const name = connection.state;
+        if (name === was) return;
         was = name;
-        // Another session means the server, and the 3D view with it, may have started anew.
-        const now = state.hello && state.hello.session;
-        if (session && now && now !== session && view3d.frame) view3d.reload();
-        session = now || session;
+        update();
+        const now = performance.now();
+        if (name !== "open") {
+            lostAt ??= now;
+            return;
+        }
+        // The server may have started anew; the 3D view then waits for a click before it returns.
+        if (lostAt !== null && now - lostAt > LONG_AWAY_MS && view3d.frame) view3d.reload();
+        lostAt = null;
     });
 
     return { swap };
