@@ -13,6 +13,8 @@ log = logging.getLogger(__name__)
 _GIVE_UP_CYCLES = 12
 """A loop this far behind (50 ms at 240 Hz) lets the lost cycles go; less is caught up."""
 _SLACK_FOR_GC_S = 0.002
+_FULL_GC_CYCLES = 240 * 60
+"""What keep_time() froze is not looked at again, so that this takes about a millisecond."""
 _FIFO_PRIORITY = 10
 
 
@@ -39,7 +41,8 @@ class LoopClock:
         self._cycles += 1
         slack = self._deadline - time.monotonic()
         if slack > _SLACK_FOR_GC_S and self._cycles % 240 == 0:
-            gc.collect(1)  # rubbish is taken out where nobody waits; see keep_time()
+            # Rubbish is taken out where nobody waits; see keep_time().
+            gc.collect(2 if self._cycles % _FULL_GC_CYCLES == 0 else 1)
             slack = self._deadline - time.monotonic()
         if slack > 0:
             time.sleep(slack)
