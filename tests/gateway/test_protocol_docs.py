@@ -1,0 +1,98 @@
+"""docs/protocol.md cannot drift from the code."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+import app.gateway.hub
+from app.config import Settings
+from app.errors import FarhandError
+from app.gateway import messages
+from app.gateway.app import create_app
+from app.gateway.errors import _HTTP_CODES
+from app.gateway.messages import _CLIENT_MESSAGE
+from app.link import actions
+from app.pipeline import STAGES
+
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "docs" / "protocol.md").read_text()
+assert app.gateway.hub  # every error class of the gateway is loaded
+
+
+def test_every_route_is_documented() -> None:
+    paths = []
+    for method, path in (
+        (method.upper(), path)
+        for path, methods in create_app(Settings(), token="x" * 32).openapi()["paths"].items()
+        for method in methods
+    ):
+        paths.append(path)
+        assert f"`{method} {path}`" in TEXT, f"{method} {path}"
+    assert len(paths) >= 18
+
+
+@pytest.mark.parametrize(
+    "path", ["/ws/operator", "/ws/camera/{name}", "/viser/", "/viser", "/signin", "/docs"]
+)
+def test_every_other_path_is_documented(path: str) -> None:
+    assert path in TEXT
+
+
+def test_every_message_is_documented() -> None:
+    for kind in messages.SERVER_MESSAGES:
+        assert f"**`{kind}`**" in TEXT, kind
+    for kind in messages.CLIENT_MESSAGES:
+        assert f'`{{"type":"{kind}"' in TEXT, kind
+    # The list that parsing uses is the list that is documented.
+    schema = _CLIENT_MESSAGE.json_schema()
+    assert set(schema["discriminator"]["mapping"]) == set(messages.CLIENT_MESSAGES)
+
+
+def test_every_action_is_documented() -> None:
+    kinds = actions.ACTION.json_schema()["discriminator"]["mapping"]
+    for kind in kinds:
+        assert f'`{{"type":"{kind}"' in TEXT, kind
+
+
+def subclasses(kind: type[FarhandError]) -> set[type[FarhandError]]:
+    return {kind}.union(*(subclasses(each) for each in kind.__subclasses__()))
+
+
+def test_every_error_code_is_documented() -> None:
+    codes = {kind.default_code for kind in subclasses(FarhandError)}
+    codes |= set(_HTTP_CODES.values()) | {"internal"}
+    for source in (ROOT / "app").rglob("*.py"):
+        codes |= set(re.findall(r'\bcode="([a-z_]+)"', source.read_text()))
+    missing = sorted(code for code in codes if f"`{code}`" not in TEXT)
+    assert missing == []
+
+
+def test_every_stage_is_documented() -> None:
+    for stage in (*STAGES, "wait", "total"):
+        assert f"`{stage}`" in TEXT, stage
+
+
+def test_the_page_knows_the_same_messages() -> None:
+    script = (ROOT / "app" / "static" / "core" / "protocol.js").read_text()
+    for name, expected in (
+        ("CLIENT_MESSAGES", messages.CLIENT_MESSAGES),
+        ("SERVER_MESSAGES", messages.SERVER_MESSAGES),
+    ):
+        listed = re.search(rf"{name} = Object\.freeze\(\[(.*?)\]\)", script, re.DOTALL)
+        assert listed is not None
+        assert set(re.findall(r'"(\w+)"', listed[1])) == set(expected)
+
+
+def test_the_limits_are_the_settings() -> None:
+    settings = Settings()
+    assert settings.gateway.max_message_bytes == 1 << 20
+    assert settings.gateway.max_upload_bytes == 4 << 20
+    assert settings.gateway.max_bad_messages == 10
+    assert settings.gateway.max_sessions == 32
+    assert settings.gateway.max_frame_age_ms == 500
+    assert settings.gateway.stop_confirm_ms == 300
+    assert settings.gateway.picture_wait_s == 2.0
+    assert settings.gateway.robot_rate_hz == 20
+    assert settings.pipeline.decode.max_bytes == 256 * 1024
+    assert (settings.pipeline.decode.max_width, settings.pipeline.decode.max_height) == (1280, 720)
