@@ -12,7 +12,7 @@ from app.link.gateway_end import GatewayEnd
 from app.link.messages import State
 from benchmarks.driving import browser, webcam
 from benchmarks.report import arguments, report
-from tests.e2e.running import start_server, stop_server
+from tests.e2e.running import start_server, stop_server, wait_for
 
 
 def measure(folder: Path, seconds: float, view_3d: bool) -> dict[str, dict[str, float]]:
@@ -27,9 +27,8 @@ def measure(folder: Path, seconds: float, view_3d: bool) -> dict[str, dict[str, 
     server = start_server(folder)
     try:
         with browser(server, video, view_3d=view_3d) as page:
-            page.wait_for_function(
-                "window.farhand.pictures.wrist > 20 && window.farhand.pictures.scene > 20",
-                timeout=60_000,
+            wait_for(
+                page, "window.farhand.pictures.wrist > 20 && window.farhand.pictures.scene > 20"
             )
             with GatewayEnd("puma", server.endpoint(), on_state=on_state):
                 before = page.evaluate(

@@ -9,7 +9,7 @@ import psutil
 from playwright.sync_api import Page, sync_playwright
 
 from app.gestures.synthetic import Step, SyntheticOperator, write_mjpeg
-from tests.e2e.running import BASE_ARGUMENTS, Server
+from tests.e2e.running import BASE_ARGUMENTS, Server, wait_for
 
 
 def webcam(script: Sequence[Step], path: Path) -> Path:
@@ -38,13 +38,13 @@ def browser(server: Server, video: Path, *, view_3d: bool = False) -> Iterator[P
             f"localStorage.setItem('farhand-hide-3d', '{'no' if view_3d else 'yes'}')"
         )
         page.goto(server.link)
-        page.wait_for_function("window.farhand?.robot?.mode === 'disarmed'", timeout=60_000)
-        page.click("#btn-start")
-        page.wait_for_function("window.farhand.frame !== null", timeout=20_000)
+        wait_for(page, "window.farhand?.robot?.mode === 'disarmed'")
+        page.click("#choose-camera")
+        wait_for(page, "window.farhand.frame !== null")
         page.click("#btn-control")
-        page.wait_for_function("window.farhand.robot.controller === window.farhand.hello.session")
+        wait_for(page, "window.farhand.robot.controller === window.farhand.hello.session")
         page.click("#btn-arm")
-        page.wait_for_function("window.farhand.robot.armed")
+        wait_for(page, "window.farhand.robot.armed")
         yield page
         if chromium.is_connected():
             chromium.close()

@@ -3,11 +3,13 @@
 import re
 import subprocess
 import sys
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import httpx
 import psutil
+from playwright.sync_api import Page
 
 TOKEN = "end-to-end-token-0123456789abcdef"
 BASE_ARGUMENTS = [
@@ -83,3 +85,20 @@ def stop_server(server: Server) -> None:
     finally:
         assert server.process.stdout is not None
         server.process.stdout.close()
+
+
+def wait_for(page: Page, expression: str, seconds: float = 60.0) -> None:
+    """Wait until a JavaScript expression is true on the page.
+
+    Playwright's own ``wait_for_function`` evaluates text inside the page, which the page's content
+    security policy rightly refuses.
+
+    Raises:
+        TimeoutError: it did not become true.
+    """
+    deadline = time.monotonic() + seconds
+    while not page.evaluate(expression):
+        if time.monotonic() > deadline:
+            robot = page.evaluate("JSON.stringify(window.farhand?.robot)")
+            raise TimeoutError(f"not true within {seconds:g} s: {expression}\nrobot: {robot}")
+        page.wait_for_timeout(20)

@@ -1,0 +1,162 @@
+"""The main job: a hand shown to a webcam in a browser moves the arm in another process."""
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from app.gestures.synthetic import Step, SyntheticOperator, write_mjpeg
+from tests.e2e.conftest import OpenPage
+from tests.e2e.running import TOKEN, Server, wait_for
+
+pytestmark = [pytest.mark.e2e, pytest.mark.timeout(300)]
+
+SLOW = 60_000
+"""ms; these machines are slow now and then, and no test here is about speed."""
+
+
+@pytest.fixture
+def showing_up(tmp_path: Path) -> Path:
+    """A webcam that shows ``up`` for two seconds, then no hand, over and over."""
+    path = tmp_path / "webcam.mjpeg"
+    write_mjpeg(SyntheticOperator((Step(None, 1.0), Step("up", 2.0))).frames(), path)
+    return path
+
+
+def start_driving(page: Page) -> None:
+    """Camera on, control taken, armed: as a person does it, by the buttons."""
+    wait_for(page, "window.farhand?.robot?.mode === 'disarmed'")
+    page.click("#choose-camera")
+    wait_for(page, "window.farhand.frame !== null")
+    page.click("#btn-control")
+    wait_for(page, "window.farhand.robot.controller === window.farhand.hello.session")
+    page.click("#btn-arm")
+    wait_for(page, "window.farhand.robot.armed")
+
+
+def height(page: Page) -> float:
+    """Of the tool above the robot's base, m."""
+    return float(page.evaluate("window.farhand.robot.tool.position[2]"))
+
+
+def test_a_hand_shown_to_the_webcam_moves_the_arm_and_the_page_shows_it(
+    server: Server, open_page: OpenPage, showing_up: Path
+) -> None:
+    page = open_page(server.link, webcam=showing_up)
+    assert "token" not in page.url
+    start_driving(page)
+    low = height(page)
+    joints = page.evaluate("window.farhand.robot.joints")
+
+    wait_for(page, "window.farhand.robot.mode === 'moving'")
+    cause = page.evaluate("window.farhand.robot.seq")
+    assert isinstance(cause, int), "the motion names the frame that caused it"
+    wait_for(page, f"window.farhand.robot.tool.position[2] > {low + 0.05}")
+    assert page.evaluate("window.farhand.robot.joints") != joints
+
+    # When the hand is gone the arm comes to rest by itself, still armed, and nothing is wrong.
+    wait_for(page, "window.farhand.robot.mode === 'armed'")
+    assert page.evaluate("window.farhand.robot.fault") is None
+
+
+def test_both_cameras_and_the_3d_view_show_the_robot(
+    server: Server, open_page: OpenPage, showing_up: Path
+) -> None:
+    page = open_page(server.link, webcam=showing_up)
+    wait_for(page, "window.farhand?.pictures.wrist > 5 && window.farhand.pictures.scene > 5")
+    # Where WebGL is slow the page asks before it shows the 3D view.
+    page.wait_for_selector("#view-3d iframe, #show-3d")
+    if page.is_visible("#show-3d"):
+        page.click("#show-3d")
+    view = page.frame_locator("#view-3d iframe")
+    canvas = view.locator("canvas").first
+    expect(canvas).to_be_visible(timeout=SLOW)
+    # The picture of the canvas itself, since WebGL clears its buffer after each frame.
+    for _ in range(120):
+        colours = set(_colours(canvas.screenshot()))
+        if len(colours) > 50:
+            break
+        page.wait_for_timeout(500)
+    assert len(colours) > 50, "the 3D view is blank"
+
+
+def _colours(png: bytes) -> list[int]:
+    import cv2
+    import numpy as np
+
+    picture = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
+    assert picture is not None
+    packed = picture.astype(np.uint32) @ np.array([1, 256, 65536], np.uint32)
+    return [int(colour) for colour in np.unique(packed)]
+
+
+def test_stop_latches_until_reset_and_arming(
+    server: Server, open_page: OpenPage, showing_up: Path
+) -> None:
+    page = open_page(server.link, webcam=showing_up)
+    start_driving(page)
+    wait_for(page, "window.farhand.robot.mode === 'moving'")
+    page.keyboard.press("Space")
+    wait_for(page, "window.farhand.robot.mode === 'stopped'")
+
+    # Gestures go on being shown, and nothing moves.
+    count = page.evaluate("window.farhand.counts.gesture")
+    stood = page.evaluate("window.farhand.robot.joints")
+    wait_for(page, f"window.farhand.counts.gesture > {count + 20}")
+    now = page.evaluate("window.farhand.robot.joints")
+    assert now == pytest.approx(stood, abs=2e-3)
+
+    page.click("#btn-reset")
+    wait_for(page, "window.farhand.robot.mode === 'disarmed'")
+    page.click("#btn-arm")
+    wait_for(page, "window.farhand.robot.mode === 'moving'")
+
+
+def test_a_killed_node_is_shown_and_comes_back_disarmed(
+    server: Server, open_page: OpenPage, showing_up: Path
+) -> None:
+    page = open_page(server.link, webcam=showing_up)
+    start_driving(page)
+    os.kill(server.node().pid, signal.SIGKILL)
+    wait_for(page, "window.farhand.robot.fault !== null")
+    wait_for(
+        page, "window.farhand.robot.fault === null && window.farhand.robot.mode === 'disarmed'"
+    )
+    assert page.evaluate("window.farhand.robot.armed") is False
+
+
+def test_the_arm_rests_after_the_browser_is_gone(
+    server: Server, open_page: OpenPage, showing_up: Path
+) -> None:
+    page = open_page(server.link, webcam=showing_up)
+    start_driving(page)
+    wait_for(page, "window.farhand.robot.mode === 'moving'")
+    page.close()
+    with server.api() as api:
+        deadline = time.monotonic() + 20
+        while (robot := api.get("/api/robots").json()[0])["controller"] is not None:
+            assert time.monotonic() < deadline, robot
+            time.sleep(0.05)
+        assert robot["mode"] == "disarmed"
+
+
+def test_the_synthetic_operator_drives_without_a_camera(
+    server: Server, open_page: OpenPage
+) -> None:
+    page = open_page(server.link)
+    wait_for(page, "window.farhand?.robot?.mode === 'disarmed'")
+    page.click("#choose-synthetic")
+    wait_for(page, "window.farhand.frame !== null")
+    page.click("#btn-control")
+    wait_for(page, "window.farhand.robot.controller !== null")
+    page.click("#btn-arm")
+    wait_for(page, "window.farhand.robot.mode === 'moving'")
+
+
+def test_a_wrong_token_opens_nothing(server: Server, open_page: OpenPage) -> None:
+    page = open_page(server.url + "/?token=wrong-" + TOKEN, allow_errors=True)
+    expect(page.locator("input")).to_be_visible()
+    assert page.evaluate("window.farhand === undefined")
