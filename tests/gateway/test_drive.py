@@ -1,0 +1,199 @@
+"""From gestures to commands."""
+
+from dataclasses import replace
+
+import pytest
+
+from app.gateway.drive import Driver, Lease, Situation
+from app.gateway.numbers import Counter, newer
+from app.link.actions import Gripper, Home, JogCartesian, Stop
+from app.link.messages import State
+
+ACTIONS = {
+    "forward": JogCartesian(linear=(0.1, 0.0, 0.0)),
+    "home": Home(),
+    "open": Gripper(width=0.08),
+    "stop": Stop(),
+}
+
+
+def state(**values: object) -> State:
+    return State(
+        **{
+            "robot": "puma",
+            "tick": 1234,
+            "mode": "armed",
+            "armed": True,
+            "controller": "me",
+            "epoch": 7,
+            "joints": (0.0,) * 6,
+            "velocities": (0.0,) * 6,
+            "commanded": (0.0,) * 6,
+            "gripper": 0.0,
+            "tool_position": (0.0,) * 3,
+            "tool_orientation": (1.0, 0.0, 0.0, 0.0),
+            **values,
+        }
+    )
+
+
+READY = Situation(ACTIONS, Lease(7), state())
+
+
+@pytest.fixture
+def driver() -> Driver:
+    return Driver("me", Counter())
+
+
+def test_a_frame_without_a_gesture_is_a_command_too(driver: Driver) -> None:
+    decision = driver.decide(None, 5, READY)
+    command = decision.command
+    assert command is not None
+    assert (command.action, command.gesture, command.reason) == (None, None, None)
+    assert (command.epoch, command.tick, command.frame) == (7, 1234, 5)
+    assert decision.reason is None
+
+
+def test_sequence_rises_and_a_hold_stays_while_the_gesture_does(driver: Driver) -> None:
+    commands = [
+        driver.decide(gesture, frame, READY).command
+        for frame, gesture in enumerate(["forward", "forward", None, "forward", "home"])
+    ]
+    assert all(commands)
+    assert [command.sequence for command in commands] == [1, 2, 3, 4, 5]
+    holds = [command.hold for command in commands]
+    assert holds[0] == holds[1]
+    assert holds[1] < holds[3] < holds[4]
+    assert [command.action for command in commands] == [
+        ACTIONS["forward"], ACTIONS["forward"], None, ACTIONS["forward"], ACTIONS["home"],
+    ]  # fmt: skip
+
+
+def test_a_gesture_that_ended_with_the_frames_begins_anew(driver: Driver) -> None:
+    first = driver.decide("home", 1, READY).command
+    driver.end()
+    second = driver.decide("home", 2, READY).command
+    assert first is not None
+    assert second is not None
+    assert second.hold > first.hold
+
+
+def test_two_sessions_never_share_a_hold() -> None:
+    holds = Counter()
+    first = Driver("a", holds).decide("home", 1, READY).command
+    second = Driver("b", holds).decide("home", 1, READY).command
+    assert first is not None
+    assert second is not None
+    assert first.hold != second.hold
+
+
+OBSTACLES = {
+    "no lease, nobody": (
+        replace(READY, lease=None, state=state(controller=None)),
+        "nobody has control: take control first",
+    ),
+    "no lease, another": (
+        replace(READY, lease=None, state=state(controller="you")),
+        "you do not have control: you drives",
+    ),
+    "away": (replace(READY, state=None), "the robot is not connected"),
+    "disarmed": (
+        replace(READY, state=state(mode="disarmed", armed=False)),
+        "the robot is not armed",
+    ),
+    "stopped": (
+        replace(READY, state=state(mode="stopped", armed=False)),
+        "the robot is stopped: reset it, then arm it",
+    ),
+    "faulted": (
+        replace(READY, state=state(mode="faulted", armed=False, fault="too hot")),
+        "the robot has a fault: too hot",
+    ),
+    "holding": (
+        replace(READY, state=state(mode="holding", reason="no commands")),
+        "the robot holds still: no commands: show no gesture for half a second, then a new one",
+    ),
+    "stale": (replace(READY, stale="the frame is too old"), "the frame is too old"),
+}
+
+
+@pytest.mark.parametrize("what", OBSTACLES)
+def test_an_obstacle_is_told_and_moves_nothing(driver: Driver, what: str) -> None:
+    situation, reason = OBSTACLES[what]
+    decision = driver.decide("forward", 1, situation)
+    assert decision.reason == reason
+    assert decision.command is None or decision.command.action is None
+    # Nor does it once the obstacle is gone, until the gesture is shown again.
+    decision = driver.decide("forward", 2, READY)
+    assert decision.reason is not None
+    assert "show it again" in decision.reason
+    assert decision.command is not None
+    assert decision.command.action is None
+    assert decision.command.gesture == "forward"
+    driver.decide(None, 3, READY)
+    decision = driver.decide("forward", 4, READY)
+    assert decision.reason is None
+    assert decision.command is not None
+    assert decision.command.action == ACTIONS["forward"]
+
+
+def test_an_obstacle_in_the_middle_ends_the_showing(driver: Driver) -> None:
+    driver.decide("forward", 1, READY)
+    driver.decide("forward", 2, replace(READY, state=state(mode="holding")))
+    decision = driver.decide("forward", 3, READY)
+    assert decision.command is not None
+    assert decision.command.action is None
+
+
+def test_one_late_frame_does_not_end_the_showing(driver: Driver) -> None:
+    driver.decide("forward", 1, READY)
+    assert driver.decide("forward", 2, replace(READY, stale="late")).command is None
+    decision = driver.decide("forward", 3, READY)
+    assert decision.command is not None
+    assert decision.command.action == ACTIONS["forward"]
+
+
+def test_nothing_shown_needs_no_reason(driver: Driver) -> None:
+    decision = driver.decide(None, 1, replace(READY, lease=None))
+    assert (decision.command, decision.stop, decision.reason) == (None, None, None)
+
+
+@pytest.mark.parametrize(
+    "situation",
+    [
+        READY,
+        replace(READY, lease=None),
+        replace(READY, state=None),
+        replace(READY, stale="late"),
+        replace(READY, state=state(mode="moving")),
+    ],
+)
+def test_a_stop_gesture_stops_whoever_shows_it_once(driver: Driver, situation: Situation) -> None:
+    stop = driver.decide("stop", 1, situation).stop
+    assert stop is not None
+    assert (stop.category, stop.source) == ("S1", "me")
+    assert driver.decide("stop", 2, situation).stop is None
+    driver.decide(None, 3, situation)
+    assert driver.decide("stop", 4, situation).stop is not None
+
+
+def test_a_stop_is_not_sent_as_an_action(driver: Driver) -> None:
+    command = driver.decide("stop", 1, READY).command
+    assert command is not None
+    assert command.action is None
+
+
+def test_a_gesture_that_was_deleted_moves_nothing(driver: Driver) -> None:
+    decision = driver.decide("gone", 1, READY)
+    assert decision.reason == "the gesture 'gone' is no longer enrolled"
+    assert decision.command is not None
+    assert decision.command.action is None
+
+
+@pytest.mark.parametrize(
+    ("sequence", "than", "expected"),
+    [(1, None, True), (2, 1, True), (1, 1, False), (1, 2, False), (0, 2**32 - 1, True),
+     (2**32 - 1, 0, False)],
+)  # fmt: skip
+def test_newer(sequence: int, than: int | None, expected: bool) -> None:
+    assert newer(sequence, than) is expected

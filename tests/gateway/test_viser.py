@@ -1,0 +1,83 @@
+"""The 3D view behind the gateway, with the real viser and the real model."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+import viser
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from tests.gateway.running import Running, StandIn, running, settings_for, wait_for
+
+PROTOCOL = f"viser-v{viser.__version__}"
+
+pytestmark = pytest.mark.timeout(120)
+
+
+@pytest.fixture
+def with_viser(node: StandIn, folder: Path) -> Iterator[Running]:
+    with running(settings_for(folder, node.endpoint, viser=True)) as server:
+        yield server
+
+
+def test_the_view_is_served_through_the_gateway(with_viser: Running, node: StandIn) -> None:
+    server = with_viser
+    page = server.http.get("/viser/")
+    assert page.status_code == 200
+    assert page.headers["content-type"].startswith("text/html")
+    assert "<!doctype html>" in page.text.lower()
+    policy = page.headers["content-security-policy"]
+    assert "frame-ancestors 'self'" in policy
+    assert "http" not in policy
+    assert server.http.get("/viser").headers["location"] == "/viser/"
+    missing = server.http.get("/viser/nothing.js")
+    assert missing.status_code == 404
+
+    scene = server.hub.viser
+    assert scene is not None
+    wait_for(lambda: scene.shown_tick, "the scene to be built", 60)
+    with server.socket("/viser", subprotocols=[PROTOCOL]) as socket:
+        assert socket.subprotocol == PROTOCOL
+        size = 0
+        # The robot's meshes: far more than an empty scene.
+        while size < 50_000:
+            size += len(socket.recv(timeout=20))
+
+    # viser itself listens on loopback alone.
+    port = scene.wait_port(1)
+    assert port is not None
+    assert httpx.get(f"http://127.0.0.1:{port}/", trust_env=False).status_code == 200
+
+
+def test_a_client_of_another_version_is_closed_as_viser_says(with_viser: Running) -> None:
+    with_viser.http.get("/viser/")
+    with (
+        with_viser.socket("/viser", subprotocols=["viser-v0.0.1"]) as socket,
+        pytest.raises(ConnectionClosed) as closed,
+    ):
+        socket.recv(timeout=20)
+    assert closed.value.rcvd is not None
+    assert closed.value.rcvd.code == 1002
+
+
+def test_a_view_that_is_off_is_told(server: Running) -> None:
+    answer = server.http.get("/viser/")
+    assert answer.status_code == 503
+    assert answer.json()["error"]["code"] == "viewer_unavailable"
+    with pytest.raises(InvalidStatus) as refused:
+        server.socket("/viser", subprotocols=[PROTOCOL])
+    assert refused.value.response.status_code == 503
+
+
+def test_viser_that_has_gone_is_told_and_hurts_nothing(with_viser: Running) -> None:
+    with_viser.http.get("/viser/")
+    scene = with_viser.hub.viser
+    assert scene is not None
+    scene.close()
+    answer = with_viser.http.get("/viser/")
+    assert answer.status_code == 503
+    with pytest.raises(InvalidStatus) as refused:
+        with_viser.socket("/viser", subprotocols=[PROTOCOL])
+    assert refused.value.response.status_code == 503
+    assert with_viser.http.get("/api/gestures").status_code == 200
