@@ -78,7 +78,8 @@ def robot(
     ] = None,
 ) -> None:
     """Start a robot node by itself, for a gateway that runs elsewhere."""
-    from app.robot.node import NodeSettings, run_node
+    from app.config import NodeSettings
+    from app.robot.node import run_node
 
     run_node(NodeSettings(id=id, model=model, endpoint=endpoint, latch=latch))
 
@@ -153,6 +154,7 @@ def main() -> None:
     logging.basicConfig(
         level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(levelname)s %(message)s"
     )
+    logging.getLogger("alembic").setLevel(logging.WARNING)
     try:
         app()
     except FarhandError as error:

@@ -82,7 +82,7 @@ def export(
 def import_(
     folder: Annotated[Path, typer.Argument(help="Folder or .zip in the exchange format.")],
     data_dir: DataDir = None,
-    replace: Annotated[bool, typer.Option(help="Remove all present gestures first.")] = False,
+    replace: Annotated[bool, typer.Option(help="Overwrite gestures of the same name.")] = False,
 ) -> None:
     """Read gestures in the exchange format: all of them, or none."""
     from app.gestures.exchange import import_set
@@ -99,7 +99,7 @@ def draw_starter_set(
     folder: Annotated[Path, typer.Argument(help="New folder for the set.")],
 ) -> None:
     """Draw the starter set with the hand renderer, through the pipeline, as it is shipped."""
-    from app.gestures.starter import draw_set
+    from app.gestures.starter import draw_starter_set as draw_set
     from app.pipeline import extract_template
 
     settings = settings_for().pipeline
