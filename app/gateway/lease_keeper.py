@@ -50,7 +50,8 @@ class LeaseKeeper:
         """The lease, while it is held as far as anybody here knows."""
         lease, state = self._lease, self._robot.live_state
         if lease is not None and state is not None and state.epoch > lease.epoch:
-            self._lose("somebody else took control")
+            who = state.controller
+            self._lose(f"{who} took over" if who else "the robot node was started again")
         return self._lease
 
     async def take(self, *, takeover: bool) -> None:

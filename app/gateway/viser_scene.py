@@ -26,8 +26,8 @@ log = logging.getLogger(__name__)
 PERIOD_S = 0.05
 RETRY_S = 2.0
 """After the scene could not be built or updated."""
-CAMERA_POSITION = (1.75, -1.45, 1.25)
-CAMERA_LOOK_AT = (0.35, 0.0, 0.35)
+CAMERA_POSITION = (2.0, -1.6, 1.55)
+CAMERA_LOOK_AT = (0.25, 0.0, 0.6)
 """m, in the robot's base frame: from the front right, the table and the whole arm in view."""
 BACKGROUND = (0.80, 0.84, 0.88)
 
@@ -85,6 +85,7 @@ class ViserScene:
             server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         # What does not depend on the robot: ground, the first view, no panels.
         server.gui.configure_theme(show_logo=False, show_share_button=False)
+        server.gui.main_panel.minimize()
         server.scene.set_up_direction("+z")
         server.scene.world_axes.visible = False
         server.initial_camera.position = CAMERA_POSITION
@@ -142,8 +143,14 @@ class ViserScene:
                 cell_color=(170, 178, 188), section_color=(140, 150, 162),
             )
         )  # fmt: skip
+        # States tell where movable things are; fixed ones stand where the model has them.
+        places = {thing.name: thing for thing in assets.model.objects}
         for thing in description.objects:
-            self._objects[thing.name] = self._add(server, thing)
+            handle = self._objects[thing.name] = self._add(server, thing)
+            if thing.name in places:
+                half = places[thing.name].turn / 2
+                handle.position = places[thing.name].position
+                handle.wxyz = (np.cos(half), 0.0, 0.0, np.sin(half))
         self._handles += self._objects.values()
         self._described = description
 
