@@ -17,7 +17,7 @@ log = logging.getLogger(__name__)
 
 DRAW_S = 300.0
 _DRAW = (
-    "import os, sys; from pathlib import Path; os.nice(15); "
+    "import os, sys; from pathlib import Path; os.nice(5); "
     "from app.gestures.synthetic import operator_clip; operator_clip(Path(sys.argv[1]))"
 )
 
