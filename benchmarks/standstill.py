@@ -5,6 +5,7 @@ node's own: from the tick of the last command to the last state in which a joint
 move faster than 0.02 rad/s. The target is 500 ms.
 """
 
+import itertools
 import subprocess
 import sys
 import time
@@ -17,6 +18,7 @@ from benchmarks.node_process import ROBOT, BenchNode, Driver
 from benchmarks.report import arguments, percentiles, report
 
 STANDING = 0.02
+GIVE_UP_S = 20.0
 FULL = 1.3
 """rad/s; joint 1 jogs at 95% of 1.43."""
 
@@ -48,9 +50,12 @@ def main() -> None:
         return
     command = [sys.executable, "-m", "benchmarks.standstill", "--drive"]
     took: list[float] = []
+    repeated = 0
     states: list[State] = []
     with BenchNode(cameras=False) as node, GatewayEnd(ROBOT, node.endpoint, states.append) as end:
-        for number in range(options.times):
+        for number in itertools.count():
+            if len(took) == options.times:
+                break
             direction = 1 if number % 2 else -1
             driver = subprocess.Popen(
                 [*command, node.endpoint, f"driver-{number}", str(direction)],
@@ -58,13 +63,22 @@ def main() -> None:
                 text=True,
                 cwd=Path(__file__).parents[1],
             )
-            while not at_full_speed(end.state):
+            deadline = time.monotonic() + GIVE_UP_S
+            while not at_full_speed(end.state) and time.monotonic() < deadline:
                 time.sleep(0.002)
+            fast = at_full_speed(end.state)
             driver.kill()
             assert driver.stdout is not None
             # The last line may be cut short by the kill; a command is sent after its line.
-            last = int(driver.stdout.read().split("\n")[-2])
+            lines = driver.stdout.read().split("\n")
+            last = int(lines[-2]) if fast else 0
             driver.wait()
+            if not fast:
+                # On a busy machine the driver itself can fall silent; the watchdog then has
+                # stopped the arm already, and there is nothing to measure.
+                repeated += 1
+                time.sleep(2.5)
+                continue
             time.sleep(1.0)
             moving = [s.tick for s in states if max(map(abs, s.velocities)) > STANDING]
             took.append(float(moving[-1] - last))
@@ -73,6 +87,7 @@ def main() -> None:
                 time.sleep(0.01)
     figures = {"last command to standstill, ms": percentiles(took)}
     figures["over 500 ms"] = {"times": float(sum(t > 500 for t in took))}
+    figures["repeated, not at full speed"] = {"times": float(repeated)}
     report(figures, options)
 
 
