@@ -14,7 +14,7 @@ from typing import Annotated, Any
 import typer
 from pydantic import ValidationError
 
-from app.cli_gestures import draw_starter_set, enrol, gestures_app, settings_for
+from app.cli_gestures import draw_operator, draw_starter_set, enrol, gestures_app, settings_for
 from app.errors import FarhandError
 
 app = typer.Typer(
@@ -27,6 +27,7 @@ app = typer.Typer(
 app.add_typer(gestures_app, name="gestures")
 app.command("enroll")(enrol)
 gestures_app.command("draw")(draw_starter_set)
+gestures_app.command("draw-operator")(draw_operator)
 
 DataDir = Annotated[
     Path | None, typer.Option(help="Folder for the database, the token and the link.")

@@ -107,6 +107,21 @@ def draw_starter_set(
     print(f"starter set drawn in {folder}")
 
 
+def draw_operator(
+    folder: Annotated[
+        Path, typer.Argument(help="Folder for operator.webm and operator.json.")
+    ] = Path("app/static/media"),
+) -> None:
+    """Draw the synthetic operator that the page plays when there is no camera, as it is shipped."""
+    from app.gestures.synthetic import operator_clip
+
+    folder.mkdir(parents=True, exist_ok=True)
+    captions = operator_clip(folder / "operator.webm")
+    rows = [caption._asdict() for caption in captions]
+    (folder / "operator.json").write_text(json.dumps(rows, indent=1) + "\n", "utf-8")
+    print(f"synthetic operator drawn in {folder}")
+
+
 def enrol(
     name: Annotated[str, typer.Argument(help="Name of the new gesture.")],
     images: Annotated[list[Path], typer.Argument(help="One or more photos of the hand.")],

@@ -6,6 +6,7 @@ from pathlib import Path
 from urllib.parse import parse_qs
 
 from fastapi import APIRouter, FastAPI, Request
+from starlette.middleware.gzip import GZipMiddleware
 from starlette.responses import FileResponse, RedirectResponse, Response
 from starlette.staticfiles import StaticFiles
 
@@ -110,5 +111,7 @@ def create_app(
     ):
         app.include_router(router)
     app.add_api_websocket_route("/ws/operator", operator_socket)
-    app.mount("/static", StaticFiles(directory=STATIC), name="static")
+    # The video is compressed already, and browsers ask for parts of it.
+    app.mount("/static/media", StaticFiles(directory=STATIC / "media"), name="media")
+    app.mount("/static", GZipMiddleware(StaticFiles(directory=STATIC), 1024), name="static")
     return app

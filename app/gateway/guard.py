@@ -25,9 +25,10 @@ PAGE_POLICY = (
     "manifest-src 'self'; frame-src 'self'; form-action 'self'; base-uri 'none'; "
     "frame-ancestors 'self'"
 )
-# viser's page is one file with everything inline, and runs WebAssembly and blob workers.
+# viser's page is one file with everything inline, runs blob workers, and WebAssembly whose glue
+# is made by eval.
 VISER_POLICY = (
-    "default-src 'self' data: blob:; script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval' blob:; "
+    "default-src 'self' data: blob:; script-src 'self' 'unsafe-inline' 'unsafe-eval' blob:; "
     "style-src 'self' 'unsafe-inline'; worker-src 'self' blob:; connect-src 'self' data: blob:; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
 )

@@ -8,7 +8,6 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from importlib.metadata import PackageNotFoundError, version
 
 from app.config import Settings
-from app.gateway.clip import Clip
 from app.gateway.gallery import LiveGallery, open_store
 from app.gateway.lease_keeper import check_reply
 from app.gateway.metrics import Metrics
@@ -63,7 +62,6 @@ class Hub:
         self.holds = Counter()
         self.sessions: set[OperatorSession] = set()
         self.relay = Relay(robot, lambda name: self.metrics.pictures.labels(name).inc())
-        self.clip = Clip(settings.data_dir)
         self.closing = asyncio.Event()
         self._link_threads = ThreadPoolExecutor(LINK_THREADS, "link")
         self._stop_threads = ThreadPoolExecutor(STOP_THREADS, "stop")

@@ -5,7 +5,7 @@ import logging
 from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
-from starlette.responses import FileResponse, HTMLResponse, JSONResponse, Response
+from starlette.responses import HTMLResponse, JSONResponse, Response
 
 from app.errors import FarhandError
 from app.gateway.pages import routes_page
@@ -64,22 +64,6 @@ async def metrics(request: Request) -> Response:
     """Prometheus' text format."""
     hub: Hub = request.app.state.hub
     return Response(hub.metrics.text(), media_type="text/plain; version=0.0.4; charset=utf-8")
-
-
-@router.get(
-    "/api/synthetic/operator.webm",
-    tags=["server"],
-    summary="A drawn operator, as video",
-    response_class=FileResponse,
-    responses={200: {"content": {"video/webm": {}}}},
-)
-async def operator_clip(request: Request) -> FileResponse:
-    """A drawn hand that shows the starter gestures; made once and kept in the data folder."""
-    hub: Hub = request.app.state.hub
-    path = await hub.clip.path()
-    return FileResponse(
-        path, media_type="video/webm", headers={"Cache-Control": "private, max-age=3600"}
-    )
 
 
 @router.get("/openapi.json", include_in_schema=False)

@@ -20,8 +20,9 @@ def server(tmp_path: Path) -> Iterator[Server]:
     stop_server(running)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def playwright() -> Iterator[Playwright]:
+    """Ends with its module: while it runs, this thread has an event loop, and others must not."""
     with sync_playwright() as instance:
         yield instance
 

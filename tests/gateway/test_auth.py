@@ -214,7 +214,6 @@ def test_everything_but_the_door_needs_the_token(server: Running) -> None:
             "/api/cameras",
             "/api/cameras/wrist.jpg",
             "/api/cameras/wrist.mjpeg",
-            "/api/synthetic/operator.webm",
             "/metrics",
             "/openapi.json",
             "/docs",

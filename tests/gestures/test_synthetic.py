@@ -1,3 +1,4 @@
+import json
 import time
 from collections import defaultdict
 from itertools import pairwise
@@ -13,6 +14,7 @@ from app.gestures import read_set
 from app.gestures.hand import POSES
 from app.gestures.synthetic import (
     CLIP,
+    Caption,
     Step,
     SyntheticOperator,
     operator_captions,
@@ -198,3 +200,22 @@ def test_frames_are_drawn_quickly_enough() -> None:
     begin = time.process_time()
     count = sum(1 for _ in operator.frames())
     assert (time.process_time() - begin) / count < 0.1
+
+
+MEDIA = Path(__file__).parents[2] / "app" / "static" / "media"
+
+
+def test_the_shipped_clip_is_what_is_drawn() -> None:
+    """Draw it anew with ``farhand gestures draw-operator`` when this fails."""
+    captions = json.loads((MEDIA / "operator.json").read_text())
+    assert [Caption(**row) for row in captions] == list(operator_captions())
+    operator = SyntheticOperator(CLIP)
+    video = cv2.VideoCapture(str(MEDIA / "operator.webm"))
+    for number, drawn in enumerate(operator.frames()):
+        there, shown = video.read()
+        assert there
+        if number % 20 == 0:
+            assert np.abs(shown.astype(int) - drawn).mean() < 4, number
+        if number > 150:
+            break
+    video.release()

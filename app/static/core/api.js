@@ -51,7 +51,7 @@ export const api = Object.freeze({
         request("POST", `api/robots/${id(robot)}/stop`, { timeoutMs }),
     resetRobot: (robot) => request("POST", `api/robots/${id(robot)}/reset`),
     /** When which gesture is shown by the synthetic operator: [{start_s, end_s, gesture}]. */
-    operatorCaptions: () => request("GET", "api/synthetic/operator.json"),
+    operatorCaptions: () => request("GET", "static/media/operator.json"),
     gestures: () => request("GET", "api/gestures"),
     createGesture(name, action, images) {
         const form = imageForm(images);

@@ -9,7 +9,7 @@ export class SyntheticSource extends EventTarget {
     #onError = () =>
         this.dispatchEvent(new CustomEvent("lost", { detail: { code: "clip" } }));
 
-    constructor(path = "api/synthetic/operator.webm") {
+    constructor(path = "static/media/operator.webm") {
         super();
         this.kind = "synthetic";
         this.label = "";

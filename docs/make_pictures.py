@@ -1,0 +1,51 @@
+"""Take the pictures of the README: a real server, a real browser, the drawn hand as webcam.
+
+Start it with ``python -m docs.make_pictures``.
+"""
+
+import tempfile
+from pathlib import Path
+
+from playwright.sync_api import Page
+
+from app.gestures.synthetic import Step
+from benchmarks.driving import browser, webcam
+from tests.e2e.running import start_server, stop_server, wait_for
+
+PICTURES = Path(__file__).parent / "pictures"
+
+
+def take(page: Page, name: str) -> None:
+    """Save what the page shows now."""
+    page.screenshot(path=PICTURES / f"{name}.png")
+
+
+def main() -> None:
+    PICTURES.mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory() as folder:
+        video = webcam((Step(None, 0.6), Step("left", 2.5)), Path(folder) / "left.mjpeg")
+        server = start_server(Path(folder))
+        try:
+            with browser(server, video, view_3d=True) as page:
+                page.set_viewport_size({"width": 1360, "height": 850})
+                page.wait_for_timeout(8000)  # the 3D view loads its meshes
+                wait_for(page, "window.farhand.robot.mode === 'moving'")
+                page.wait_for_timeout(400)
+                take(page, "drive")
+                page.click("#teach-open")
+                page.wait_for_timeout(800)
+                page.fill("#teach-name", "wave")
+                page.click("#capture-one")
+                page.wait_for_selector(".stills li", timeout=20_000)
+                take(page, "teach")
+            with browser(server, video) as page:
+                page.set_viewport_size({"width": 360, "height": 740})
+                wait_for(page, "window.farhand.robot.mode === 'moving'")
+                page.wait_for_timeout(400)
+                take(page, "phone")
+        finally:
+            stop_server(server)
+
+
+if __name__ == "__main__":
+    main()
