@@ -102,11 +102,12 @@ class Controller:
                 self._ended = command.hold
                 reason = f"the gesture {command.gesture or 'stop'!r} was shown"
                 self.stop(StopRequest(source=self.lease.holder or "", reason=reason))
+        elif shown and not self.safety.may_move:
+            # Whatever is shown now moves nothing later: arming begins no motion.
+            self._ended = max(self._ended, command.hold)
         elif command.action is None:
             self._let_go()
             self._note = None
-        elif not self.safety.may_move:
-            self._ended = max(self._ended, command.hold)
         elif command.hold == self._hold:
             if command.action != self.motion.action and self.motion.doing:
                 self._let_go()

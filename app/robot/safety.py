@@ -5,10 +5,12 @@
     phase     | arm      disarm    lease   stop S2,   stop S1,  N: no gesture  reset
               |                    gone    watchdog   stop S0   for 0.5 s
     ----------+--------------------------------------------------------------------------
-    DISARMED  | HOLDING  -         -       -          STOPPED   -              -
+    DISARMED  | *        -         -       -          STOPPED   -              -
     HOLDING   | HOLDING  DISARMED  DISARM  HOLDING    STOPPED   ARMED          -
-    ARMED     | HOLDING  DISARMED  DISARM  HOLDING    STOPPED   -              -
+    ARMED     | ARMED    DISARMED  DISARM  HOLDING    STOPPED   -              -
     STOPPED   | refused  -         -       -          worst     -              DISARMED
+
+    * ARMED if nothing was ever stopped, or N was met since; else HOLDING.
 
 Only in ARMED does anything move. The three categories of a stop:
 
@@ -16,8 +18,9 @@ Only in ARMED does anything move. The three categories of a stop:
 - S1: ramp, then brakes on and motors off. Latched: resumes by a reset, then arm, then N.
 - S0: brakes on and motors off at once. Latched like S1.
 
-Arming leaves S2 in force, so that every way back ends in N: nothing begins to move because of a
-hand that was up already. Times are seconds on the node's monotonic clock, and nothing else.
+Every way back from a stop ends in N. And arming never begins a motion: a gesture that was shown
+before it counts no more (see :mod:`app.robot.controller`). Times are seconds on the node's
+monotonic clock, and nothing else.
 """
 
 import enum
@@ -60,6 +63,8 @@ class Safety:
         self.stops = 0
         """Stop requests received."""
         self._no_gesture_since: float | None = None
+        self._owes_n = False
+        """There was a stop, and N has not been met since."""
         if (before := latch.load()) is not None:
             category: StopCategory = "S0" if before.category == "S0" else "S1"
             self._go(Phase.STOPPED, category, f"{before.reason} (from before the node started)")
@@ -99,14 +104,18 @@ class Safety:
 
     def arm(self) -> LeaseReply:
         """A: the operator arms. Whether the operator may was checked before."""
+        if self.phase is Phase.ARMED:
+            return LeaseReply(granted=True, reason="armed already")
         if self.phase is Phase.STOPPED:
             return LeaseReply(
                 granted=False, code="latched", reason=f"stopped: {self.reason}; reset it first"
             )
-        self._no_gesture_since = None
-        self._go(
-            Phase.HOLDING, "S2", "armed: show no gesture for half a second, then a new gesture"
-        )
+        if self._owes_n:
+            self._no_gesture_since = None
+            why = "armed: show no gesture for half a second, then a new gesture"
+            self._go(Phase.HOLDING, "S2", why)
+        else:
+            self._go(Phase.ARMED, None, None)
         return LeaseReply(granted=True)
 
     def disarm(self, reason: str) -> None:
@@ -137,6 +146,7 @@ class Safety:
         if self._no_gesture_since is None:
             self._no_gesture_since = now
         if self.phase is Phase.HOLDING and now - self._no_gesture_since >= NO_GESTURE_S:
+            self._owes_n = False
             self._go(Phase.ARMED, None, None)
 
     def silence(self) -> None:
@@ -155,3 +165,4 @@ class Safety:
                 reason or "ready",
             )
         self.phase, self.category, self.reason = phase, category, reason
+        self._owes_n |= category is not None

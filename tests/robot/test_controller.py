@@ -128,10 +128,46 @@ def test_after_silence_only_a_new_gesture_after_half_a_second_of_none_moves() ->
     assert operator.state.mode == "moving"
 
 
+def test_arming_begins_no_motion_and_the_first_new_gesture_does() -> None:
+    operator = Operator()
+    operator.ask("take")
+    operator.show(JOG, 1, 0.3)
+    operator.ask("arm")
+    assert operator.state.mode == "armed"
+    operator.show(JOG, 1, 0.5)
+    assert not operator.arm.velocities.any()
+    operator.show(JOG, 2, 0.2)
+    assert operator.state.mode == "moving"
+
+
+def test_a_gesture_whose_action_was_withheld_does_not_move_after_arming() -> None:
+    operator = Operator()
+    operator.ask("take")
+    operator.controller.cycle(operator.now, [operator.command(None, 1, gesture="left")])
+    operator.ask("arm")
+    operator.show(JOG, 1, 0.3)
+    assert operator.state.mode == "armed"
+
+
+def test_arming_after_a_stop_waits_for_half_a_second_of_no_gesture() -> None:
+    operator = Operator().ready()
+    operator.show(JOG, 1, 0.3)
+    operator.ask("release")
+    operator.wait(0.5)
+    operator.ask("take")
+    operator.ask("arm")
+    assert operator.state.mode == "holding"
+    operator.show(JOG, 2, 0.5)
+    assert operator.state.mode == "holding"
+    operator.show(None, 2, 0.6)
+    assert operator.state.mode == "armed"
+
+
 def test_a_gesture_without_an_allowed_action_is_not_no_gesture() -> None:
     operator = Operator()
     operator.ask("take")
     operator.ask("arm")
+    operator.controller.stop(StopRequest(category="S2", source="test", reason="x"))
     for _ in range(40):
         command = operator.command(None, 1, gesture="left", reason="not armed")
         operator.controller.cycle(operator.now, [command])
