@@ -11,6 +11,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from app.errors import FarhandError, FrameRefused, RequestError
 from app.gateway.drive import Situation
 from app.gateway.errors import INTERNAL_MESSAGE
+from app.gateway.frame_age import FrameAge
 from app.gateway.frame_job import FrameJob, FrameWorker
 from app.gateway.lease_keeper import LeaseKeeper
 from app.gateway.messages import (
@@ -83,6 +84,7 @@ class OperatorSession:
         self._last_bad = 0
         self._bad_in_a_row = 0
         self._opened_tick = tick_ms()
+        self._age = FrameAge(hub.settings.gateway.max_frame_age_ms)
         self._detail = False
         self._next_detail = 0.0
 
@@ -210,7 +212,7 @@ class OperatorSession:
                 actions=enrolled.actions,
                 lease=self._leases.lease,
                 state=self._hub.robot.live_state,
-                stale=self._stale(header.tick),
+                stale=self._age(header.tick, header.captured_ms, tick_ms()),
             ),
             enrolled=enrolled,
             detail=detail,
@@ -235,23 +237,6 @@ class OperatorSession:
                 width=header.width,
                 height=header.height,
             )
-
-    def _stale(self, seen_tick: int) -> str | None:
-        """Why a frame is too old to move anything, judged by the newest tick its sender had seen.
-
-        A sender that has seen none yet (0) knew no later moment than the session's opening.
-        """
-        now = tick_ms()
-        if seen_tick > now:
-            return "the frame names a server tick that has not come yet"
-        age = now - max(seen_tick, self._opened_tick)
-        limit = self._settings.gateway.max_frame_age_ms
-        if age <= limit:
-            return None
-        return (
-            f"the frame is too old to move the robot: its sender had seen nothing newer than "
-            f"{age} ms ago, at most {limit} ms are allowed"
-        )
 
     def _take_text(self, text: str) -> None:
         message = parse_client_message(text)
