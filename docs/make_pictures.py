@@ -6,13 +6,28 @@ Start it with ``python -m docs.make_pictures``.
 import tempfile
 from pathlib import Path
 
+import cv2
+import numpy as np
 from playwright.sync_api import Page
 
+from app.gestures.hand import POSES, HandView, render_hand
 from app.gestures.synthetic import Step
 from benchmarks.driving import browser, webcam
 from tests.e2e.running import start_server, stop_server, wait_for
 
 PICTURES = Path(__file__).parent / "pictures"
+
+
+def draw_gestures() -> None:
+    """The ten starter gestures side by side, with their names."""
+    tiles = []
+    for name, pose in POSES.items():
+        tile = render_hand(pose, (200, 240), HandView(150, (88.0, 128.0)))
+        cv2.putText(tile, name, (10, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.65, (60, 40, 20), 2)
+        tiles.append(tile)
+    half = len(tiles) // 2
+    rows = [np.hstack(tiles[:half]), np.hstack(tiles[half:])]
+    cv2.imwrite(str(PICTURES / "gestures.png"), np.vstack(rows))
 
 
 def take(page: Page, name: str) -> None:
@@ -22,6 +37,7 @@ def take(page: Page, name: str) -> None:
 
 def main() -> None:
     PICTURES.mkdir(exist_ok=True)
+    draw_gestures()
     with tempfile.TemporaryDirectory() as folder:
         video = webcam((Step(None, 0.6), Step("left", 2.5)), Path(folder) / "left.mjpeg")
         server = start_server(Path(folder))

@@ -11,6 +11,7 @@ import httpx
 import psutil
 from playwright.sync_api import Page
 
+ROOT = Path(__file__).parents[2]
 TOKEN = "end-to-end-token-0123456789abcdef"
 BASE_ARGUMENTS = [
     "--no-sandbox",
@@ -53,7 +54,9 @@ class Server:
         return words[words.index("--endpoint") + 1]
 
 
-def start_server(folder: Path, *options: str) -> Server:
+def start_server(
+    folder: Path, *options: str, cwd: Path = ROOT, env: dict[str, str] | None = None
+) -> Server:
     """Start a server on a free port and wait for its link."""
     log = folder / "server.log"
     with log.open("a") as stderr:
@@ -65,7 +68,8 @@ def start_server(folder: Path, *options: str) -> Server:
             stdout=subprocess.PIPE,
             stderr=stderr,
             text=True,
-            cwd=Path(__file__).parents[2],
+            cwd=cwd,
+            env=env,
         )  # fmt: skip
     assert process.stdout is not None
     for line in process.stdout:

@@ -1,0 +1,134 @@
+"""The command line, run as its users run it."""
+
+import json
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import cv2
+import httpx
+import numpy as np
+import pytest
+
+from app.gestures.hand import POSES, render_hand
+from app.gestures.synthetic import Step, SyntheticOperator, write_mjpeg
+from tests.e2e.running import ROOT, TOKEN, start_server, stop_server
+
+pytestmark = pytest.mark.timeout(300)
+
+
+def farhand(*arguments: str, fails: bool = False) -> subprocess.CompletedProcess[str]:
+    """Run ``farhand`` and hold that it ends as it should."""
+    done = subprocess.run(
+        [sys.executable, "-m", "app", *arguments], capture_output=True, text=True, cwd=ROOT
+    )
+    assert (done.returncode != 0) == fails, done.stderr
+    assert "Traceback" not in done.stderr
+    return done
+
+
+@pytest.fixture
+def photo(tmp_path: Path) -> Path:
+    """A picture of a hand."""
+    path = tmp_path / "hand.jpg"
+    cv2.imwrite(str(path), render_hand(POSES["home"], (640, 480)))
+    return path
+
+
+def test_gestures_are_enrolled_listed_exported_and_imported(tmp_path: Path, photo: Path) -> None:
+    data, other = str(tmp_path / "data"), str(tmp_path / "other")
+    farhand("enroll", "wave", str(photo), "--action", '{"type":"home"}', "--data-dir", data)
+    rows = json.loads(farhand("gestures", "list", "--json", "--data-dir", data).stdout)
+    assert len(rows) == 11
+    assert {"name": "wave", "action": {"type": "home"}, "samples": 1}.items() <= rows[-1].items()
+
+    farhand("gestures", "export", str(tmp_path / "set"), "--data-dir", data)
+    farhand("gestures", "import", str(tmp_path / "set"), "--replace", "--data-dir", other)
+    again = json.loads(farhand("gestures", "list", "--json", "--data-dir", other).stdout)
+    assert {row["name"] for row in again} == {row["name"] for row in rows}
+
+
+def test_what_is_wrong_is_told_in_one_line(tmp_path: Path, photo: Path) -> None:
+    data = ("--data-dir", str(tmp_path / "data"))
+    cases = [
+        (("enroll", "x", str(photo), "--action", '{"type":"fly"}', *data), "action is not valid"),
+        (("enroll", "stop", str(photo), "--action", '{"type":"home"}', *data), "stop"),
+        (("enroll", "x", "nowhere.jpg", "--action", '{"type":"home"}', *data), "nowhere.jpg"),
+        (("evaluate", str(tmp_path / "none")), "none"),
+        (("serve", "--host", "0.0.0.0", *data), "HTTPS"),
+        (("serve", "--port", "99999", *data), "port"),
+    ]
+    for arguments, expected in cases:
+        told = farhand(*arguments, fails=True).stderr.strip().splitlines()[-1]
+        assert told.startswith("farhand: ") and expected in told, told
+
+
+def test_a_photo_without_a_hand_is_refused_and_nothing_is_enrolled(
+    tmp_path: Path, photo: Path
+) -> None:
+    blank = tmp_path / "blank.png"
+    cv2.imwrite(str(blank), np.full((480, 640, 3), 200, np.uint8))
+    data = ("--data-dir", str(tmp_path / "data"))
+    action = ("--action", '{"type":"home"}')
+    told = farhand("enroll", "x", str(photo), str(blank), *action, *data, fails=True).stderr
+    assert "no hand" in told
+    rows = json.loads(farhand("gestures", "list", "--json", *data).stdout)
+    assert len(rows) == 10
+
+
+def test_evaluate_prints_json(tmp_path: Path) -> None:
+    for name in ("up", "stop"):
+        folder = tmp_path / "set" / name
+        folder.mkdir(parents=True)
+        for number in range(3):
+            picture = render_hand(POSES[name], (320, 240), seed=number)
+            cv2.imwrite(str(folder / f"{number}.jpg"), picture)
+    arguments = ("--shots", "1", "--trials", "2", "--seed", "3", "--json", "-")
+    result = json.loads(farhand("evaluate", str(tmp_path / "set"), *arguments).stdout)
+    assert result["accuracy"]["mean"] == 1.0
+    assert set(result["per_label"]) == {"up", "stop"}
+    assert {"confusion", "rejected", "unknown_accepted", "ms_per_image"} <= set(result)
+
+
+def test_replay_prints_events_as_json_lines(tmp_path: Path) -> None:
+    video = tmp_path / "video.mjpeg"
+    write_mjpeg(SyntheticOperator((Step(None, 0.3), Step("up", 0.8))).frames(), video)
+    lines = farhand("replay", str(video), "--data-dir", str(tmp_path / "data")).stdout.splitlines()
+    records = [json.loads(line) for line in lines]
+    starts = [r["gesture"] for r in records if r["type"] == "gesture" and r["phase"] == "start"]
+    assert starts == ["up"]
+    assert any(r["reason"] for r in records if r["type"] == "frame")
+
+
+def test_doctor_finds_nothing_wrong_here(tmp_path: Path) -> None:
+    found = farhand("doctor", "--port", "0", "--data-dir", str(tmp_path / "data")).stdout
+    assert "FAIL" not in found
+    assert "robot node" in found
+
+
+def test_the_wheel_works_in_an_empty_folder(tmp_path: Path) -> None:
+    build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)]
+    subprocess.run(build, check=True, capture_output=True, cwd=ROOT)
+    (wheel,) = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(tmp_path / "site")
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "site")}
+    server = start_server(empty, cwd=empty, env=environment)
+    try:
+        signed_in = {"Authorization": f"Bearer {TOKEN}"}
+        page = httpx.get(server.url + "/", headers=signed_in)
+        assert "<title>Farhand</title>" in page.text
+        gestures = httpx.get(server.url + "/api/gestures", headers=signed_in).json()
+        assert len(gestures) == 10
+        video = httpx.get(server.url + "/static/media/operator.webm", headers=signed_in)
+        assert video.content[:4] == b"\x1aE\xdf\xa3"
+        robot = httpx.get(server.url + "/api/robots", headers=signed_in).json()[0]
+        assert robot["online"], robot
+        where = server.node().environ()["PYTHONPATH"]
+        assert where.startswith(str(tmp_path / "site"))
+    finally:
+        stop_server(server)
