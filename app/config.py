@@ -285,8 +285,11 @@ class NodeSettings(_Section):
         default=None, description="file that keeps the latched stop over a restart"
     )
     cameras: bool = Field(default=True, description="start the camera process, too")
-    exit_with_parent: bool = Field(
-        default=False, description="stop the arm and end when the starting process is gone"
+    parent: int | None = Field(
+        default=None,
+        ge=1,
+        description="process id of the one that starts the node; when that one is gone, however "
+        "early, the node stops the arm and ends",
     )
     motion: ArmMotionSettings = ArmMotionSettings()
 

@@ -32,7 +32,7 @@ def node_command(robot: str, endpoint: str, latch: Path) -> list[str]:
     """The command line of a node."""
     return [
         sys.executable, "-m", "app.robot.node", "--id", robot, "--endpoint", endpoint,
-        "--latch", str(latch), "--exit-with-parent",
+        "--latch", str(latch), "--parent", str(os.getpid()),
     ]  # fmt: skip
 
 

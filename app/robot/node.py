@@ -55,7 +55,6 @@ class Node:
             arm, settings.id, settings.motion, StopLatch(settings.latch), time.monotonic()
         )
         self._clock = LoopClock(DT)
-        self._parent = os.getppid()
         self._ending: str | None = None
         self._cycles = 0
 
@@ -79,7 +78,8 @@ class Node:
     def stop_at_once(self, reason: str) -> None:
         """The loop failed: brakes on, latched."""
         self.controller.fault = reason
-        self.controller.stop(StopRequest(category="S0", source="node", reason=reason))
+        # Errors may be long, a reason may not: the stop must not fail for its text.
+        self.controller.stop(StopRequest(category="S0", source="node", reason=reason[:300]))
         self._end.publish_state(
             self.controller.state(time.monotonic()).model_copy(update={"mode": "faulted"})
         )
@@ -103,9 +103,9 @@ class Node:
                 controller.gate.dropped[f"invalid_{kind}"] = count
             end.publish_state(controller.state(now, self._clock.state()))
         if (
-            self._settings.exit_with_parent
+            self._settings.parent is not None
             and self._cycles % _PARENT_EVERY == 0
-            and os.getppid() != self._parent
+            and os.getppid() != self._settings.parent
         ):
             self.end("the process that started it is gone")
 
@@ -171,7 +171,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--latch", type=Path, help="file that keeps a latched stop")
     parser.add_argument("--no-cameras", action="store_true", help="start no camera process")
     parser.add_argument(
-        "--exit-with-parent", action="store_true", help="end when the starting process is gone"
+        "--parent", type=int, help="process id of the one that starts it; end when that is gone"
     )
     given = parser.parse_args(arguments)
     logging.basicConfig(
@@ -184,7 +184,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             endpoint=given.endpoint,
             latch=given.latch,
             cameras=not given.no_cameras,
-            exit_with_parent=given.exit_with_parent,
+            parent=given.parent,
         )
         run_node(settings)
     except ValidationError as error:

@@ -13,10 +13,15 @@ from pathlib import Path
 
 import pytest
 
+from app.config import NodeSettings
 from app.link.actions import Action, Home, JogJoint, Pose, TurnJoint
 from app.link.gateway_end import GatewayEnd
 from app.link.messages import Command, LeaseReply, LeaseRequest, State, StopRequest, key
+from app.link.node_end import NodeEnd
 from app.link.session import open_session, socket_endpoint
+from app.robot.latch import StopLatch
+from app.robot.node import Node
+from tests.robot.fakes import FakeArm
 
 ROOT = Path(__file__).parents[2]
 JOG = JogJoint(joint=1, velocity=1.0)
@@ -271,9 +276,9 @@ def test_it_ends_with_its_parent() -> None:
     folder = Path(tempfile.mkdtemp(prefix="fh-"))
     endpoint = socket_endpoint(folder / "n.sock")
     code = (
-        "import subprocess, sys, time\n"
+        "import os, subprocess, sys, time\n"
         "child = subprocess.Popen([sys.executable, '-m', 'app.robot.node', '--no-cameras',"
-        " '--exit-with-parent', '--endpoint', sys.argv[1]])\n"
+        " '--parent', str(os.getpid()), '--endpoint', sys.argv[1]])\n"
         "print(child.pid, flush=True)\n"
         "time.sleep(60)\n"
     )
@@ -294,6 +299,40 @@ def test_it_ends_with_its_parent() -> None:
         if child:
             os.kill(child, signal.SIGKILL)
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def test_a_loop_that_failed_brakes_whatever_the_error_says(tmp_path: Path) -> None:
+    tmp_path.chmod(0o700)
+    endpoint = f"unixsock-stream/{tmp_path}/n.sock"
+    settings = NodeSettings(endpoint=endpoint, latch=tmp_path / "latch")
+    arm = FakeArm()
+    node = Node(settings, arm, NodeEnd("puma", endpoint))
+    try:
+        arm.braked = node.controller.braked = False
+        node.stop_at_once("the control loop failed: " + "no profile " * 100)
+        assert arm.braked
+        latched = StopLatch(settings.latch).load()
+        assert latched is not None
+        assert latched.category == "S0"
+        assert latched.reason.startswith("the control loop failed: no profile")
+    finally:
+        node.close()
+
+
+def test_it_ends_when_its_parent_was_gone_before_it_ran(tmp_path: Path) -> None:
+    tmp_path.chmod(0o700)
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    arguments = ["--endpoint", f"unixsock-stream/{tmp_path}/n.sock", "--parent", str(gone.pid)]
+    done = subprocess.run(
+        [sys.executable, "-m", "app.robot.node", "--no-cameras", *arguments],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 0
+    assert "ending: the process that started it is gone" in done.stderr
 
 
 @pytest.mark.parametrize(
