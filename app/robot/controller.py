@@ -82,6 +82,7 @@ class Controller:
     def answer(self, request: LeaseRequest, now: float) -> LeaseReply:
         """Answer a request for the lease, or to arm, disarm or reset."""
         reply = self._answer(request, now)
+        self._settle()  # at once: what comes next in this cycle may allow motion again
         if request.kind != "renew" or not reply.granted:
             log.info(
                 "%s by %s: %s %s", request.kind, request.holder, reply.code, reply.reason or ""
@@ -101,7 +102,7 @@ class Controller:
             if command.hold > self._ended:
                 self._ended = command.hold
                 reason = f"the gesture {command.gesture or 'stop'!r} was shown"
-                self.stop(StopRequest(source=self.lease.holder or "", reason=reason))
+                self.stop(StopRequest(source=self.lease.holder or "", reason=reason[:300]))
         elif shown and not self.safety.may_move:
             # Whatever is shown now moves nothing later: arming begins no motion.
             self._ended = max(self._ended, command.hold)

@@ -155,14 +155,14 @@ class Safety:
 
     def _go(self, phase: Phase, category: StopCategory | None, reason: str | None) -> None:
         before = (self.phase, self.category, self.reason)
+        self.phase, self.category, self.reason = phase, category, reason
+        self._owes_n |= category is not None
         if before != (phase, category, reason):
             log.info(
                 "%s %s -> %s %s: %s",
-                self.phase.value,
-                self.category or "",
+                before[0].value,
+                before[1] or "",
                 phase.value,
                 category or "",
                 reason or "ready",
             )
-        self.phase, self.category, self.reason = phase, category, reason
-        self._owes_n |= category is not None

@@ -319,6 +319,21 @@ def test_disarming_stops_and_brakes() -> None:
     assert operator.state.reason == "disarmed by anna"
 
 
+def test_disarmed_and_armed_within_one_cycle_the_arm_stops_all_the_same() -> None:
+    operator = Operator().ready()
+    operator.show(JOG, 1, 0.4)
+    assert operator.ask("disarm").granted
+    assert operator.ask("arm").granted
+    operator.show(JOG, 1, 0.3)
+    assert not operator.arm.velocities.any()
+
+
+def test_a_stop_gesture_stops_however_long_its_name_is() -> None:
+    operator = Operator().ready()
+    operator.controller.cycle(operator.now, [operator.command(Stop(), 1, gesture="x" * 1000)])
+    assert operator.state.mode == "stopped"
+
+
 def test_a_burst_of_stale_commands_moves_nothing() -> None:
     operator = Operator().ready()
     burst = [operator.command(JOG, 1) for _ in range(30)]
