@@ -166,7 +166,9 @@ class Relay:
                 if camera.viewers:
                     last_seen = time.monotonic()
                 elif time.monotonic() - last_seen > LINGER_S:
-                    return
+                    await self._end_watch(camera)
+                    if not camera.viewers:
+                        return
                 if camera.watch is None:
                     try:
                         camera.watch = await asyncio.to_thread(
@@ -174,11 +176,17 @@ class Relay:
                         )
                     except FarhandError as error:
                         log.debug("camera %s: %s", camera.name, error.message)
+                    except Exception:
+                        log.exception("camera %s cannot be watched", camera.name)
                 await asyncio.sleep(RETRY_S)
         finally:
-            watch, camera.watch = camera.watch, None
-            if watch is not None:
-                await asyncio.shield(asyncio.to_thread(watch.close))
+            await self._end_watch(camera)
+
+    async def _end_watch(self, camera: _Camera) -> None:
+        """Stop watching. Somebody may come to look meanwhile."""
+        watch, camera.watch = camera.watch, None
+        if watch is not None:
+            await asyncio.shield(asyncio.to_thread(watch.close))
 
     def _share(self, camera: _Camera, picture: bytes) -> None:
         if self._on_picture is not None:

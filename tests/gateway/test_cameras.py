@@ -1,11 +1,15 @@
 """The relay of camera pictures, with a camera that counts what it publishes."""
 
+import asyncio
 import threading
 import time
+from typing import Any
 
 import pytest
 from websockets.exceptions import InvalidStatus
 
+from app.gateway import relay as module
+from app.gateway.relay import Relay
 from app.link.header import HEADER_SIZE, FrameHeader
 from tests.gateway.running import Running, StandIn, StandInCamera, wait_for
 
@@ -109,3 +113,54 @@ def test_what_a_viewer_sends_is_ignored(server: Running, node: StandIn) -> None:
         viewer.send(b"\x00")
         viewer.recv(timeout=10)
         viewer.recv(timeout=10)
+
+
+class Robot:
+    """Watches of which each gives one picture, and closes only when it may."""
+
+    description = None
+    fault = None
+
+    def __init__(self) -> None:
+        self.watches = 0
+        self.failures = 0
+        self.closing = threading.Event()
+        self.may_close = threading.Event()
+
+    def watch_camera(self, name: str, callback: Any) -> "Robot":
+        if self.failures:
+            self.failures -= 1
+            raise RuntimeError("the session is closed")
+        self.watches += 1
+        callback(FrameHeader(self.watches, 0.0, 0), b"jpeg")
+        return self
+
+    def close(self) -> None:
+        self.closing.set()
+        self.may_close.wait(10)
+
+
+async def test_who_comes_while_the_watch_ends_gets_pictures(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(module, "LINGER_S", 0.0)
+    monkeypatch.setattr(module, "RETRY_S", 0.01)
+    robot = Robot()
+    relay = Relay(robot)  # type: ignore[arg-type]
+    assert await relay.picture("wrist", 5) == b"jpeg"
+    await asyncio.to_thread(robot.closing.wait, 5)
+    async with relay.view("wrist") as viewer:
+        robot.may_close.set()
+        async with asyncio.timeout(5):
+            assert FrameHeader.unpack(await viewer.next()).sequence == 2
+    await relay.close()
+
+
+async def test_a_watch_that_fails_is_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "RETRY_S", 0.01)
+    robot = Robot()
+    robot.failures = 2
+    robot.may_close.set()
+    relay = Relay(robot)  # type: ignore[arg-type]
+    assert await relay.picture("wrist", 5) == b"jpeg"
+    await relay.close()
