@@ -10,7 +10,6 @@ import shutil
 import tempfile
 import threading
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
@@ -41,7 +40,6 @@ class RobotPort:
 
     Args:
         settings: Of the whole server; a node is started when ``settings.robot.spawn`` is on.
-        on_state: Called with each state, on a thread of the link; must return at once.
 
     Raises:
         CannotStart: the node runs elsewhere but no endpoint is given, or no private folder for
@@ -49,11 +47,10 @@ class RobotPort:
         LinkFailed: the socket's path is too long.
     """
 
-    def __init__(self, settings: Settings, on_state: Callable[[State], None] | None = None) -> None:
+    def __init__(self, settings: Settings) -> None:
         self.id = settings.robot.id
         self._silence_s = settings.gateway.robot_silence_ms / 1000
         self._ask_timeout_s = settings.gateway.lease_timeout_ms / 1000
-        self._on_state = on_state
         self._changed = threading.Condition()
         self._state: State | None = None
         self._state_at: float | None = None
@@ -179,19 +176,23 @@ class RobotPort:
         """
         before = self._state
         sent_at = time.monotonic()
-        log.warning("stop: %s (%s)", request.reason, request.source)
+        told = False
 
         def confirmed() -> bool:
             state, at = self._state, self._state_at
             if state is None or at is None or at <= sent_at:
                 return False
-            return state.mode == "stopped" or before is None or state.stops > before.stops
+            counted = before is not None and state.stops > before.stops
+            return counted or state.mode == "stopped"
 
         while True:
             link = self._link
             if link is not None:
                 with contextlib.suppress(RobotUnavailable):
                     link.stop(request)
+            if not told:  # after it was sent, because a log may make us wait
+                told = True
+                log.warning("stop: %s (%s)", request.reason, request.source)
             left = sent_at + timeout_s - time.monotonic()
             with self._changed:
                 if self._changed.wait_for(confirmed, max(0.0, min(RESEND_S, left))):
@@ -237,8 +238,6 @@ class RobotPort:
             self._state_at = time.monotonic()
             self._lost = False
             self._changed.notify_all()
-        if self._on_state is not None:
-            self._on_state(state)
 
     def _take_alive(self, alive: bool) -> None:
         if not alive:
