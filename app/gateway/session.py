@@ -12,7 +12,7 @@ from app.errors import FarhandError, FrameRefused, RequestError
 from app.gateway.drive import Situation
 from app.gateway.errors import INTERNAL_MESSAGE
 from app.gateway.frame_age import FrameAge
-from app.gateway.frame_job import FrameJob, FrameWorker
+from app.gateway.frame_job import FrameDone, FrameJob, FrameWorker
 from app.gateway.lease_keeper import LeaseKeeper
 from app.gateway.messages import (
     ClientMessage,
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+MAX_STOPS = 8
+"""Stops of one session under way at once; one more would tell the robot nothing new."""
 MAX_REQUESTS = 16
 """Requests to the robot that may wait for those before them."""
 IDLE_CHECK_S = 0.05
@@ -248,10 +250,7 @@ class OperatorSession:
             case TakeControl():
                 self._queue(message)
             case _ if message.type == "stop":
-                # Never behind anything else.
-                task = asyncio.create_task(self._stop("the stop button was pressed", "button"))
-                self._stops.add(task)
-                task.add_done_callback(self._stops.discard)
+                self._begin_stop("the stop button was pressed", "button")
             case _:
                 self._queue(message)
 
@@ -279,8 +278,11 @@ class OperatorSession:
             job, self._slot = self._slot, None
             if job is None:
                 continue
+            running = loop.run_in_executor(self._hub.images, self._worker.run, job)
+            running.add_done_callback(self._heed_stop)
             try:
-                done = await loop.run_in_executor(self._hub.images, self._worker.run, job)
+                # Shielded: a stop that is shown counts although the browser goes meanwhile.
+                done = await asyncio.shield(running)
             except FrameRefused as error:
                 self._bad(error, job.seq, job.arrival)
                 continue
@@ -290,12 +292,24 @@ class OperatorSession:
             metrics.frame_times(done.timing_ms)
             if done.decision.command is not None:
                 metrics.commands.inc()
-            if done.decision.stop is not None:
-                task = asyncio.create_task(self._stop(done.decision.stop.reason, "gesture"))
-                self._stops.add(task)
-                task.add_done_callback(self._stops.discard)
             for message in done.messages:
                 self.outbox.put(message)
+
+    def _heed_stop(self, running: asyncio.Future[FrameDone]) -> None:
+        """A frame has been looked at: if it says stop, stop."""
+        if running.cancelled() or running.exception() is not None:
+            return
+        stop = running.result().decision.stop
+        if stop is not None:
+            self._begin_stop(stop.reason, "gesture")
+
+    def _begin_stop(self, reason: str, source: str) -> None:
+        """Stop the robot, behind nothing else; goes on even if this session ends."""
+        if len(self._stops) >= MAX_STOPS:
+            return
+        task = asyncio.create_task(self._stop(reason, source))
+        self._stops.add(task)
+        task.add_done_callback(self._stops.discard)
 
     async def _stop(self, reason: str, source: str) -> None:
         self._hub.metrics.stops.labels(source).inc()

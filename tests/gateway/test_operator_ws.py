@@ -3,6 +3,7 @@
 import base64
 import json
 import struct
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 from websockets.exceptions import ConnectionClosed
 
+from app.gateway.frame_job import FrameDone, FrameJob, FrameWorker
 from app.link.header import FrameHeader
 from app.link.messages import COMMAND_TTL_MS
 from tests.gateway.running import Operator, Running, StandIn, running, settings_for, wait_for
@@ -457,6 +459,44 @@ def test_a_stop_does_not_wait_for_a_request_that_hangs(server: Running, node: St
         time.sleep(0.05)
         node.silent = False
         operator.next("robot", mode="stopped", timeout_s=2)
+
+
+def test_many_stops_at_once_are_one(server: Running, node: StandIn) -> None:
+    with server.operator() as operator:
+        node.silent = True
+        for _ in range(100):
+            operator.send("stop")
+        operator.send("ping", t=1.0)
+        operator.next("pong")
+        counted = server.hub.metrics.stops.labels("button")._value.get()
+        assert 1 <= counted < 50
+        node.silent = False
+        operator.next("robot", mode="stopped")
+
+
+def test_a_stop_gesture_counts_although_the_browser_goes_at_once(
+    server: Running, node: StandIn, hand: Hand, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen, go_on = threading.Event(), threading.Event()
+    run = FrameWorker.run
+
+    def slow(worker: FrameWorker, job: FrameJob) -> FrameDone:
+        done = run(worker, job)
+        if done.decision.stop is not None:
+            seen.set()
+            go_on.wait(10)
+        return done
+
+    monkeypatch.setattr(FrameWorker, "run", slow)
+    with server.operator() as operator:
+        rest(operator, hand(None))
+        while not seen.wait(0.03):
+            operator.frame(hand("stop"))
+    try:
+        wait_for(lambda: not server.hub.sessions, "the session to end")
+    finally:
+        go_on.set()
+    wait_for(lambda: node.stops, "the stop")
 
 
 def test_a_detail_view_brings_masks_and_distances(server: Running, hand: Hand) -> None:
