@@ -3,10 +3,17 @@
 from dataclasses import dataclass
 
 from app.gateway.numbers import Counter
-from app.link.actions import Action, Stop
+from app.link.actions import Action, Sequence, Stop, TurnJoint
 from app.link.messages import Command, State, StopRequest
 
+REST_S = 0.5
+"""Frames must show no gesture for so long before the same gesture surely is a new showing."""
+LONGEST_GAP_S = 0.25
+"""Frames farther apart than this leave open what was shown between them."""
 _AGAIN = "show no gesture for half a second, then a new one"
+_TOO_EARLY = "this gesture began before the robot was ready: let go and show it again"
+_REPEATED = f"this was done already: {_AGAIN}"
+_CHANGED = f"the gestures changed while a hand was up: {_AGAIN}"
 
 
 @dataclass(frozen=True)
@@ -26,6 +33,8 @@ class Situation:
     """Newest state of the robot; None when it is not connected."""
     stale: str | None = None
     """Why the frame is too old to move anything, in plain words."""
+    at: float = 0.0
+    """When the frame arrived, s, monotonic."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +53,11 @@ class Driver:
     for this session, or during which it was not, moves nothing any more: neither arming nor the
     end of a fault starts a motion by itself.
 
+    A gesture may seem to end although the hand stays up: frames are lost, or show it badly. So one
+    that comes back before frames have shown none for :data:`REST_S` is the same showing, where that
+    matters: when it was not to move anything, and when its action adds up. Likewise a hand that was
+    up when the gestures changed begins nothing.
+
     Args:
         session: Name of the session, for the log of stops.
         holds: Numbers of showings; shared by all sessions, so that none comes twice.
@@ -54,12 +68,22 @@ class Driver:
         self._holds = holds
         self._sequence = 0
         self._gesture: str | None = None
+        self._last: str | None = None
         self._hold = 0
-        self._may_move = False
+        self._barred: str | None = None
+        """Why this showing moves nothing."""
+        self._changed = False
+        self._last_frame = float("-inf")
+        self._none_since: float | None = None
 
     def end(self) -> None:
         """The gesture is over: frames stopped coming."""
         self._gesture = None
+
+    def gestures_changed(self) -> None:
+        """A hand that is up may now show another gesture than before."""
+        self._changed = True
+        self._none_since = None
 
     def decide(self, gesture: str | None, frame: int, situation: Situation) -> Decision:
         """Decide on one processed frame.
@@ -71,13 +95,14 @@ class Driver:
         """
         begins = gesture is not None and gesture != self._gesture
         self._gesture = gesture
+        action = None if gesture is None else situation.actions.get(gesture)
+        rested = self._rested(gesture, situation.at)
+        self._changed = self._changed and not rested
         reason = self._obstacle(situation)
         if begins:
-            self._hold = self._holds.next()
-            self._may_move = reason is None
+            self._begin(gesture, action, rested=rested, ready=reason is None)
         elif reason is not None and not situation.stale:
-            self._may_move = False
-        action = None if gesture is None else situation.actions.get(gesture)
+            self._barred = _TOO_EARLY
         stop = None
         if gesture is not None and isinstance(action, Stop):
             # Anybody's stop counts, with or without control, and however late it comes.
@@ -89,8 +114,8 @@ class Driver:
             action = None
         elif gesture is not None and action is None:
             reason = f"the gesture {gesture!r} is no longer enrolled"
-        elif gesture is not None and reason is None and not self._may_move:
-            reason = "this gesture began before the robot was ready: let go and show it again"
+        elif gesture is not None and reason is None:
+            reason = self._barred
         if gesture is None or reason is not None:
             action = None
         if situation.stale or situation.lease is None or situation.state is None:
@@ -104,9 +129,36 @@ class Driver:
             hold=self._hold,
             gesture=gesture,
             action=action,
-            reason=reason if gesture else None,
+            reason=reason[:300] if gesture and reason else None,
         )
         return Decision(command=command, stop=stop, reason=reason if gesture else None)
+
+    def _begin(
+        self, gesture: str | None, action: Action | None, *, rested: bool, ready: bool
+    ) -> None:
+        """A gesture is seen that was not held a frame ago."""
+        again = gesture == self._last and not rested
+        self._last = gesture
+        if again and (self._barred or isinstance(action, TurnJoint | Sequence)):
+            self._barred = self._barred or _REPEATED
+            return
+        self._hold = self._holds.next()
+        if not ready:
+            self._barred = _TOO_EARLY
+        else:
+            self._barred = _CHANGED if self._changed else None
+
+    def _rested(self, gesture: str | None, now: float) -> bool:
+        """Whether the frames up to now have shown no gesture for long enough."""
+        if now - self._last_frame > LONGEST_GAP_S:
+            self._none_since = None
+        self._last_frame = now
+        since = self._none_since
+        if gesture is not None:
+            self._none_since = None
+        elif since is None:
+            self._none_since = now
+        return since is not None and now - since >= REST_S
 
     def _obstacle(self, situation: Situation) -> str | None:
         """Why no gesture could move the robot now, if so."""

@@ -71,6 +71,7 @@ class FrameWorker:
         if job.enrolled.version != self._version:
             self._pipeline.matcher = job.enrolled.matcher
             self._version = job.enrolled.version
+            self._driver.gestures_changed()
         result = self._pipeline(job.jpeg, seq=job.seq, now=job.arrived)
         decision = self._driver.decide(result.gesture, job.seq, job.situation)
         if decision.command is not None:

@@ -215,6 +215,7 @@ class OperatorSession:
                 lease=self._leases.lease,
                 state=self._hub.robot.live_state,
                 stale=self._age(header.tick, header.captured_ms, tick_ms()),
+                at=now,
             ),
             enrolled=enrolled,
             detail=detail,

@@ -6,12 +6,14 @@ import pytest
 
 from app.gateway.drive import Driver, Lease, Situation
 from app.gateway.numbers import Counter, newer
-from app.link.actions import Gripper, Home, JogCartesian, Stop
+from app.link.actions import Gripper, Home, JogCartesian, Sequence, Stop, TurnJoint
 from app.link.messages import State
 
 ACTIONS = {
     "forward": JogCartesian(linear=(0.1, 0.0, 0.0)),
     "home": Home(),
+    "turn": TurnJoint(joint=1, angle=0.5),
+    "wave": Sequence(steps=(TurnJoint(joint=6, angle=0.5),)),
     "open": Gripper(width=0.08),
     "stop": Stop(),
 }
@@ -38,6 +40,16 @@ def state(**values: object) -> State:
 
 
 READY = Situation(ACTIONS, Lease(7), state())
+
+
+def at(seconds: float) -> Situation:
+    return replace(READY, at=seconds)
+
+
+def let_go(driver: Driver, begin: float = 2.0, seconds: float = 0.5) -> None:
+    """Ten frames a second that show no gesture."""
+    for count in range(round(seconds * 10) + 1):
+        assert driver.decide(None, 3, at(begin + count / 10)).reason is None
 
 
 @pytest.fixture
@@ -130,8 +142,8 @@ def test_an_obstacle_is_told_and_moves_nothing(driver: Driver, what: str) -> Non
     assert decision.command is not None
     assert decision.command.action is None
     assert decision.command.gesture == "forward"
-    driver.decide(None, 3, READY)
-    decision = driver.decide("forward", 4, READY)
+    let_go(driver)
+    decision = driver.decide("forward", 4, at(2.6))
     assert decision.reason is None
     assert decision.command is not None
     assert decision.command.action == ACTIONS["forward"]
@@ -188,6 +200,86 @@ def test_a_gesture_that_was_deleted_moves_nothing(driver: Driver) -> None:
     assert decision.reason == "the gesture 'gone' is no longer enrolled"
     assert decision.command is not None
     assert decision.command.action is None
+
+
+@pytest.mark.parametrize("gesture", ["turn", "wave"])
+def test_an_action_that_adds_up_is_not_repeated_while_the_hand_stays_up(
+    driver: Driver, gesture: str
+) -> None:
+    first = driver.decide(gesture, 1, at(0.0)).command
+    assert first is not None and first.action is not None
+    let_go(driver, 0.1, 0.3)  # the hand was seen badly
+    again = driver.decide(gesture, 2, at(0.5))
+    assert again.command is not None
+    assert (again.command.hold, again.command.action) == (first.hold, None)
+    assert again.reason == (
+        "this was done already: show no gesture for half a second, then a new one"
+    )
+    driver.end()  # frames did not come for seconds
+    driver.decide(None, 3, at(5.0))
+    assert driver.decide(gesture, 4, at(5.1)).reason == again.reason
+    let_go(driver, 5.2)
+    anew = driver.decide(gesture, 5, at(5.8)).command
+    assert anew is not None
+    assert anew.hold > first.hold
+    assert anew.action == ACTIONS[gesture]
+
+
+def test_another_gesture_in_between_makes_a_new_showing(driver: Driver) -> None:
+    driver.decide("turn", 1, at(0.0))
+    driver.decide("forward", 2, at(0.1))
+    command = driver.decide("turn", 3, at(0.2)).command
+    assert command is not None
+    assert command.action == ACTIONS["turn"]
+
+
+def test_a_jog_goes_on_after_a_flicker(driver: Driver) -> None:
+    driver.decide("forward", 1, at(0.0))
+    driver.decide(None, 2, at(0.1))
+    decision = driver.decide("forward", 3, at(0.2))
+    assert decision.reason is None
+    assert decision.command is not None
+    assert decision.command.action == ACTIONS["forward"]
+
+
+def test_a_flicker_does_not_make_a_barred_showing_a_new_one(driver: Driver) -> None:
+    driver.decide("forward", 1, replace(READY, state=state(mode="disarmed", armed=False)))
+    driver.decide(None, 2, at(0.1))
+    decision = driver.decide("forward", 3, at(0.2))
+    assert decision.reason is not None
+    assert "show it again" in decision.reason
+    assert decision.command is not None
+    assert decision.command.action is None
+
+
+def test_a_hand_that_was_up_when_the_gestures_changed_begins_nothing(driver: Driver) -> None:
+    let_go(driver, 0.0, 2.0)  # a hand that nobody knows
+    driver.gestures_changed()
+    driver.decide(None, 1, at(2.1))
+    decision = driver.decide("forward", 2, at(2.2))
+    assert decision.reason == (
+        "the gestures changed while a hand was up: "
+        "show no gesture for half a second, then a new one"
+    )
+    assert decision.command is not None
+    assert decision.command.action is None
+    let_go(driver, 2.3)
+    assert driver.decide("forward", 3, at(2.9)).reason is None
+
+
+def test_a_jog_under_way_goes_on_when_other_gestures_change(driver: Driver) -> None:
+    driver.decide("forward", 1, at(0.0))
+    driver.gestures_changed()
+    decision = driver.decide("forward", 2, at(0.1))
+    assert decision.command is not None
+    assert decision.command.action == ACTIONS["forward"]
+
+
+def test_a_long_fault_does_not_break_the_command(driver: Driver) -> None:
+    faulted = replace(READY, state=state(mode="faulted", armed=False, fault="x" * 1000))
+    command = driver.decide("forward", 1, faulted).command
+    assert command is not None
+    assert command.reason is not None
 
 
 @pytest.mark.parametrize(
