@@ -16,6 +16,8 @@ from benchmarks.driving import browser, webcam
 from tests.e2e.running import start_server, stop_server, wait_for
 
 PICTURES = Path(__file__).parent / "pictures"
+PAUSE = "window.paint = requestAnimationFrame; window.requestAnimationFrame = (f) => (window.f = f)"
+GO_ON = "window.requestAnimationFrame = window.paint; requestAnimationFrame(window.f)"
 
 
 def draw_gestures() -> None:
@@ -44,12 +46,18 @@ def main() -> None:
         try:
             with browser(server, video, view_3d=True) as page:
                 page.set_viewport_size({"width": 1360, "height": 850})
-                page.wait_for_timeout(8000)  # the 3D view loads its meshes
+                page.frame_locator("#view-3d iframe").locator("canvas").first.wait_for()
+                page.wait_for_timeout(15_000)  # the meshes arrive
+                # Software WebGL leaves too few frames to drive by: it pauses until the arm moves.
+                view = page.query_selector("#view-3d iframe").content_frame()
+                view.evaluate(PAUSE)
                 wait_for(page, "window.farhand.robot.mode === 'moving'")
-                page.wait_for_timeout(400)
+                page.wait_for_timeout(500)
+                view.evaluate(GO_ON)
+                page.wait_for_timeout(250)
                 take(page, "drive")
+                page.click("#hide-3d")
                 page.click("#teach-open")
-                page.wait_for_timeout(800)
                 page.fill("#teach-name", "wave")
                 page.click("#capture-one")
                 page.wait_for_selector(".stills li", timeout=20_000)

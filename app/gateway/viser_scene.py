@@ -133,6 +133,8 @@ class ViserScene:
         if self._urdf is not None:
             self._urdf.remove()
         self._handles, self._objects, self._shown = [], {}, None
+        # Shadows cost software WebGL most of its time.
+        server.scene.configure_default_lights(cast_shadow=False)
         assets = model_assets(description.model)
         self._urdf = ViserUrdf(server, assets.urdf_path, root_node_name="/robot")
         arm = {joint.name: index for index, joint in enumerate(description.joints)}
