@@ -191,3 +191,34 @@ def test_nothing_foreign_and_nothing_inline() -> None:
         text = path.read_text().replace("http://www.w3.org/2000/svg", "")
         assert not re.search(r"https?://\w", text), path
         assert "innerHTML" not in text, path
+
+
+@pytest.mark.parametrize(
+    ("action", "reason", "expected"),
+    [
+        ({"type": "home"}, None, "“g” is done. Lower your hand, then show the next one."),
+        ({"type": "jog_joint", "joint": 1, "velocity": 1.0}, None, "Sees “g”."),
+        (
+            {"type": "pose", "name": "moon"},
+            "this robot has no pose 'moon'",
+            "Sees “g”. This robot has no pose 'moon'.",
+        ),
+    ],
+)
+def test_a_held_gesture_while_the_arm_stands(
+    modules: Page, action: dict[str, Any], reason: str | None, expected: str
+) -> None:
+    """Only what ends by itself is called done; what is refused says why."""
+    state = {
+        "connection": {"state": "open"},
+        "hello": {"session": "me"},
+        "robot": {
+            "mode": "armed", "armed": True, "controller": "me", "reason": reason, "online": True,
+        },
+        "source": {"state": "running"},
+        "frame": {"reason": None},
+        "frameAt": 0,
+        "gesture": {"gesture": "g", "phase": "hold"},
+        "gestures": [{"name": "g", "action": action}],
+    }  # fmt: skip
+    assert run(modules, "ui/sentence.js", "return m.sentenceFor(a, 100)", state) == expected

@@ -19,6 +19,16 @@ function seen(state) {
     return gesture || null;
 }
 
+/** A gesture is held, and the arm stands. */
+function whileStanding(state, gesture) {
+    const why = state.robot.reason || state.frame.reason;
+    if (why) return `${words.seen(gesture)} ${asSentence(why)}`;
+    // A jog does not end by itself: it is about to begin.
+    const known = state.gestures.find(({ name }) => name === gesture);
+    const over = known && !known.action.type.startsWith("jog_") && state.gesture.phase === "hold";
+    return over ? words.done(gesture) : words.seen(gesture);
+}
+
 function whileDriving(state, now) {
     const { robot, frame } = state;
     if (state.source.state === "starting") return words.sourceStarting;
@@ -33,7 +43,7 @@ function whileDriving(state, now) {
     if (robot.limits && robot.limits.length) return words.limits(robot.limits.join(", "));
     if (!frame) return words.waitingPicture;
     if (now - state.frameAt > STALE_FRAME_MS) return words.noFrames;
-    if (gesture) return words.done(gesture);
+    if (gesture) return whileStanding(state, gesture);
     return frame.reason ? asSentence(frame.reason) : words.ready;
 }
 
