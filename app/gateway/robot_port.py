@@ -133,6 +133,8 @@ class RobotPort:
             return self._state.fault if self._state is not None else None
         if self._process is not None and self._process.fault is not None:
             return self._process.fault
+        if self._lost:
+            return "the robot node is gone"
         age = self.age_s
         if age is not None:
             return f"no word from the robot for {age:.1f} s"
