@@ -8,6 +8,7 @@ COPY requirements.lock ./
 RUN pip install --no-cache-dir uv && python -m venv /opt/farhand \
     && uv pip install --python /opt/farhand/bin/python --require-hashes --no-deps -r requirements.lock
 COPY pyproject.toml README.md LICENSE ./
+COPY training/NOTICE training/NOTICE
 COPY app app
 COPY gesture_db gesture_db
 RUN uv pip install --python /opt/farhand/bin/python --no-deps .

@@ -95,6 +95,17 @@ def evaluate(
     unknown: Annotated[
         Path | None, typer.Option(help="Folder of labels that are never enrolled.")
     ] = None,
+    holdout_labels: Annotated[
+        int, typer.Option(min=0, help="Labels left out in each trial, to play the unknown.")
+    ] = 0,
+    group: Annotated[
+        str | None,
+        typer.Option(
+            metavar="REGEX",
+            help="Finds the room or person in a file name, such as '^[^-]+'; "
+            "none of them is both enrolled from and asked about.",
+        ),
+    ] = None,
     json_to: Annotated[
         Path | None, typer.Option("--json", help="Write JSON to a file, or to - for stdout.")
     ] = None,
@@ -110,12 +121,21 @@ def evaluate(
         reject=reject,
         unknown=unknown,
         settings=settings_for().pipeline,
+        group=group,
+        holdout_labels=holdout_labels,
     )
     text = json.dumps(result, indent=2)
     if json_to is not None and str(json_to) != "-":
         json_to.write_text(text + "\n")
-        accuracy = result["accuracy"]
-        print(f"accuracy {accuracy['mean']:.3f} ± {accuracy['std']:.3f}; written to {json_to}")
+        accuracy, text = result["accuracy"], ""
+        if result["curve"]:
+            text = (
+                f"unknown accepted {result['unknown_accepted']:.1%}, known missed where 5% "
+                f"of them are accepted {result['missed_at_5_percent_accepted']:.1%}; "
+            )
+        print(
+            f"accuracy {accuracy['mean']:.3f} ± {accuracy['std']:.3f}; {text}written to {json_to}"
+        )
     else:
         print(text)
 

@@ -2,15 +2,18 @@
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from pydantic import ValidationError
 
 from app.config import Settings
-from app.errors import CannotStart, Invalid
+from app.errors import CannotStart, ImageRefused, Invalid
 from app.gestures import GestureStore
 from app.link.actions import ACTION
+
+if TYPE_CHECKING:
+    from app.pipeline.types import U8
 
 gestures_app = typer.Typer(help="The gesture database.", no_args_is_help=True)
 
@@ -52,6 +55,7 @@ def list_gestures(
                 "name": gesture.name,
                 "action": ACTION.dump_python(gesture.action, mode="json", exclude_none=True),
                 "samples": len(gesture.samples),
+                "active": gesture.active,
             }
             for gesture in gestures
         ]
@@ -59,7 +63,8 @@ def list_gestures(
         return
     for gesture in gestures:
         action = ACTION.dump_json(gesture.action, exclude_none=True).decode()
-        print(f"{gesture.name:20} {len(gesture.samples):3} samples  {action}")
+        state = "" if gesture.active else "  (inactive)"
+        print(f"{gesture.name:20} {len(gesture.samples):3} samples  {action}{state}")
 
 
 @gestures_app.command("export")
@@ -127,9 +132,18 @@ def enrol(
     images: Annotated[list[Path], typer.Argument(help="One or more photos of the hand.")],
     action: Annotated[str, typer.Option(help='Action as JSON, such as \'{"type": "home"}\'.')],
     data_dir: DataDir = None,
+    burst: Annotated[
+        bool, typer.Option("--burst", help="The photos are frames of a few seconds: keep the best.")
+    ] = False,
+    inactive: Annotated[
+        bool, typer.Option("--inactive", help="Enrol it, but do not match it yet.")
+    ] = False,
 ) -> None:
-    """Enrol a gesture from one or more photos."""
-    from app.pipeline import extract_template, pack_template
+    """Enrol a gesture from one or more photos, and say what it may be confused with."""
+    from app.gateway.enrolment import confusions_json
+    from app.gateway.gallery import build_matcher
+    from app.gestures.records import clean_name
+    from app.pipeline import pack_template
 
     try:
         parsed = ACTION.validate_json(action)
@@ -137,16 +151,54 @@ def enrol(
         first = error.errors()[0]
         raise Invalid(f"the action is not valid: {first['msg']}", action=action) from error
     settings = settings_for(data_dir=data_dir)
-    templates = []
+    name = clean_name(name)
+    templates = [pack_template(template) for template in _templates(images, settings, burst)]
+    store = open_store(settings)
+    try:
+        threshold = build_matcher(store, settings.pipeline).max_distance
+        confusions = confusions_json(store.list(), settings.pipeline, threshold, name, templates)
+        gesture = store.create(name, parsed, templates, active=not inactive)
+    finally:
+        store.close()
+    print(f"enrolled {gesture.name!r} with {len(templates)} samples{', inactive' * inactive}")
+    for one in confusions:
+        print(f"{one['level']} to be taken for {one['gesture']!r} ({one['strength']:.0%} as near):")
+        for advice in one["advice"]:
+            print(f"  {advice['message']}")
+
+
+def _templates(images: list[Path], settings: Settings, burst: bool) -> "list[U8]":
+    """The templates of photos that are good enough; prints what could be better.
+
+    Raises:
+        CannotStart: a file cannot be read.
+        ImageRefused: a photo is refused, or no frame of a burst is good.
+    """
+    from app.pipeline.burst import choose, look_at, see
+
+    looks = []
     for image in images:
         try:
             data = image.read_bytes()
         except OSError as error:
             raise CannotStart(f"{image} cannot be read: {error.strerror}") from error
-        templates.append(pack_template(extract_template(data, settings.pipeline).template))
-    store = open_store(settings)
-    try:
-        gesture = store.create(name, parsed, templates)
-    finally:
-        store.close()
-    print(f"enrolled {gesture.name!r} with {len(templates)} samples")
+        try:
+            look = (look_at if burst else see)(data, settings.pipeline)
+        except ImageRefused as error:
+            error.message = f"{image}: {error.message}"
+            raise
+        looks.append(look)
+    if burst:
+        chosen = choose(looks, settings.pipeline)
+        counts = ", ".join(f"{count} {code}" for code, count in chosen.left_out.items())
+        counts = counts.replace("_", " ")
+        if not chosen.kept:
+            raise ImageRefused(f"none of the {len(images)} photos can be enrolled: {counts}")
+        if counts:
+            print(f"left out: {counts}")
+        looks = [chosen.looks[number] for number in chosen.kept]
+    else:
+        for image, look in zip(images, looks, strict=True):
+            for advice in look.advice:
+                print(f"{image}: {advice.message}")
+    return [look.template for look in looks if look.template is not None]

@@ -53,8 +53,13 @@ class NormaliseSettings(_Section):
 
 
 class BinariseSettings(_Section):
-    """From a grey plane to hand and background."""
+    """From a picture to hand and background."""
 
+    mode: Literal["auto", "threshold", "learned"] = Field(
+        default="auto",
+        description="threshold: a global threshold (the paper), for plain backgrounds; learned: a "
+        "small network, for rooms; auto: whichever suits the picture, with the reason shown",
+    )
     channel: Literal["luminance", "cr"] = Field(
         default="cr",
         description="plane that is thresholded: luminance (the paper) or the red difference Cr",
@@ -70,6 +75,13 @@ class BinariseSettings(_Section):
         le=255.0,
         description="levels (of 255) between the mean of the hand and the mean of the background; "
         "with less there is no hand",
+    )
+    min_sure: float = Field(
+        default=0.75,
+        ge=0.5,
+        le=1.0,
+        description="learned mode: mean share of hand over the mask; with less there is no hand. "
+        "Nine in ten true hands in rooms have 0.8 or more, most mistaken ones less than this",
     )
     min_area: Fraction = Field(default=0.005, description="smallest hand, part of the picture")
     max_area: Fraction = Field(default=0.8, description="largest hand, part of the picture")
@@ -90,6 +102,17 @@ class MotionSettings(_Section):
         ge=0.0,
         le=2.0,
         description="least time between two sampled frames; 0 samples every frame",
+    )
+    settle_s: float = Field(
+        default=0.23,
+        ge=0.0,
+        le=1.0,
+        description="a gesture may start only when the hand looks as it did so long ago; 0 leaves "
+        "that out (paper)",
+    )
+    settle_threshold: Fraction = Field(
+        default=0.05,
+        description="it looks the same when fewer than this part of the hand's pixels mismatch",
     )
 
 
@@ -124,20 +147,29 @@ class WristSettings(_Section):
 class MatchSettings(_Section):
     """Which enrolled gesture is nearest, and when none is near enough."""
 
-    features: Literal["distance", "binary"] = Field(
-        default="distance",
-        description="distance: signed distance transform squashed by tanh; binary: the pixels "
+    features: Literal["shape", "distance", "binary"] = Field(
+        default="shape",
+        description="shape: distance, and what a small network learned of many hands; distance: "
+        "signed distance transform squashed by tanh; binary: the pixels "
         "themselves (the paper)",
+    )
+    shape_weight: float = Field(
+        default=0.8, ge=0.0, le=4.0, description="weight of the network's numbers, with shape"
     )
     components: int = Field(default=60, ge=1, le=400, description="principal components kept")
     turns: tuple[float, ...] = Field(
-        default=(-0.3, -0.15, 0.0, 0.15, 0.3),
+        default=(-0.45, -0.3, -0.15, 0.0, 0.15, 0.3, 0.45),
         min_length=1,
         max_length=15,
         description="rad; every template and every query is also tried turned by these",
     )
+    shears: tuple[float, ...] = Field(
+        default=(-0.2, 0.2),
+        max_length=5,
+        description="every template is also tried leaning sideways by so much of its height",
+    )
     cuts: tuple[float, ...] = Field(
-        default=(1.0, 1.3, 1.7),
+        default=(1.3,),
         max_length=5,
         description="palm radii from the palm's centre; every query is tried cut at each of these",
     )
@@ -147,7 +179,7 @@ class MatchSettings(_Section):
         description="palm radii; every template is also tried with so much less wrist",
     )
     max_distance: float = Field(
-        default=0.34,
+        default=0.44,
         ge=0.0,
         le=2.0,
         description="farthest accepted match, root mean square over the features",
@@ -158,7 +190,7 @@ class MatchSettings(_Section):
         "templates are",
     )
     min_reach: float = Field(
-        default=0.26, ge=0.0, le=2.0, description="a match as near as this is never too far"
+        default=0.36, ge=0.0, le=2.0, description="a match as near as this is never too far"
     )
     min_margin: float = Field(
         default=0.03,
@@ -167,7 +199,7 @@ class MatchSettings(_Section):
         description="least lead over the second gesture, in the unit of the distance",
     )
     max_error: float = Field(
-        default=0.3,
+        default=0.5,
         ge=0.0,
         le=2.0,
         description="largest reconstruction error accepted, in the unit of the distance",
@@ -177,8 +209,28 @@ class MatchSettings(_Section):
 class AgreementSettings(_Section):
     """From matches to gestures that start, hold and end."""
 
-    votes: int = Field(default=2, ge=1, le=30, description="frames that must agree (N)")
-    window: int = Field(default=3, ge=1, le=30, description="of the last so many frames (M)")
+    votes: int = Field(default=3, ge=1, le=30, description="frames that must agree (N)")
+    window: int = Field(default=4, ge=1, le=30, description="of the last so many frames (M)")
+    settle_s: float = Field(
+        default=0.15,
+        ge=0.0,
+        le=1.0,
+        description="and for so long no frame may have shown another gesture, at any frame rate",
+    )
+    doubt_s: float = Field(
+        default=0.05,
+        ge=0.0,
+        le=1.0,
+        description="so much longer for a match that is barely accepted; for a clearer one in "
+        "proportion less",
+    )
+    max_strangeness: float = Field(
+        default=0.95,
+        ge=0.0,
+        le=1.0,
+        description="a gesture starts only when its frames are in the mean no stranger than this; "
+        "1 is what a match may be at most",
+    )
     release_s: float = Field(
         default=0.15,
         ge=0.0,
@@ -205,6 +257,31 @@ class StillSettings(_Section):
     )
 
 
+class QualitySettings(_Section):
+    """Which photographs are refused at enrolment."""
+
+    min_sharpness: float = Field(
+        default=1.4,
+        ge=0.0,
+        le=3.0,
+        description="how much finer a hand's picture must be than the same picture blurred; about "
+        "1 is all blur; 0 refuses none",
+    )
+    min_palm: float = Field(
+        default=7.0,
+        ge=0.0,
+        le=200.0,
+        description="pixels after scaling down; smallest radius of the palm",
+    )
+    second_hand: float = Field(
+        default=0.7,
+        ge=0.0,
+        le=2.0,
+        description="a second thing whose palm has so many of the hand's palm radii is a second "
+        "hand; 0 never is",
+    )
+
+
 class PipelineSettings(_Section):
     """From a picture to a gesture."""
 
@@ -218,6 +295,7 @@ class PipelineSettings(_Section):
     match: MatchSettings = MatchSettings()
     agreement: AgreementSettings = AgreementSettings()
     still: StillSettings = StillSettings()
+    quality: QualitySettings = QualitySettings()
 
 
 class RobotSettings(_Section):
@@ -310,6 +388,12 @@ class GatewaySettings(_Section):
     )
     max_upload_bytes: int = Field(
         default=4 << 20, ge=64 * 1024, le=64 << 20, description="bytes of one upload over REST"
+    )
+    max_burst_bytes: int = Field(
+        default=16 << 20,
+        ge=64 * 1024,
+        le=64 << 20,
+        description="bytes of one upload over REST that enrols a burst of frames",
     )
     max_bad_messages: int = Field(
         default=10, ge=1, le=1000, description="bad messages in a row that close a session (1007)"

@@ -20,6 +20,8 @@ _NODE_START_S = 20.0
 _RENDER_S = 2.0
 _RENDER_FPS_WANTED = 20
 """Pictures a second from each of two cameras; below that driving by picture feels late."""
+_MASK_MS_WANTED = 100
+"""Longest for one mask by the network; three of them have to agree before a gesture starts."""
 
 
 class Finding(NamedTuple):
@@ -104,6 +106,30 @@ def check_codecs(settings: Settings) -> Finding:
     return Finding(True, "JPEG, PNG, WebP and WebM work")
 
 
+def check_networks(settings: Settings) -> Finding:
+    """Both networks load, make what they should of one picture, and are fast enough."""
+    from app.config import MatchSettings
+    from app.pipeline.features import Features
+    from app.pipeline.mask import LearnedMask
+
+    picture = np.tile(np.arange(160, dtype=np.uint8)[:, None], (120, 1, 3))
+    find_hand = LearnedMask()
+    find_hand(picture)
+    began = time.monotonic()
+    # Turned round, or it would stand for the picture before.
+    mask = find_hand(np.ascontiguousarray(picture[:, ::-1])).mask
+    took = (time.monotonic() - began) * 1e3
+    view = np.zeros((1, 40, 30), np.uint8)
+    view[:, 10:, 10:20] = 1
+    numbers = Features(MatchSettings(features="shape"))(view)[0, view.size :]
+    if mask.shape != picture.shape[:2] or not np.isfinite(numbers).all() or not numbers.any():
+        return Finding(False, "the networks answer nonsense", "install onnxruntime anew")
+    text = f"the hand's mask by network takes {took:.0f} ms"
+    if took > _MASK_MS_WANTED:
+        return Finding(False, text, "gestures in rooms will lag: use a faster machine")
+    return Finding(True, text)
+
+
 def check_port(settings: Settings) -> Finding:
     """The port can be listened on."""
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
@@ -181,6 +207,7 @@ CHECKS: dict[str, Callable[[Settings], Finding]] = {
     "pybullet": check_pybullet,
     "renderer": check_renderer,
     "codecs": check_codecs,
+    "networks": check_networks,
     "port": check_port,
     "database": check_database,
     "robot node": check_node,

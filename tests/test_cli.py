@@ -12,7 +12,8 @@ import httpx
 import numpy as np
 import pytest
 
-from app.gestures.hand import POSES, render_hand
+from app.gestures.hand import POSES, HandLook, HandView, render_hand, render_sprite
+from app.gestures.hand.render import compose
 from app.gestures.synthetic import Step, SyntheticOperator, write_mjpeg
 from tests.e2e.running import ROOT, TOKEN, start_server, stop_server
 
@@ -35,6 +36,16 @@ def photo(tmp_path: Path) -> Path:
     path = tmp_path / "hand.jpg"
     cv2.imwrite(str(path), render_hand(POSES["home"], (640, 480)))
     return path
+
+
+def hand_in_a_room() -> bytes:
+    """JPEG of a drawn hand before patches of many colours."""
+    size = (320, 240)
+    sprite = render_sprite(POSES["stop"], size, HandView(150, (150, 130)), HandLook())
+    patches = np.random.default_rng(3).uniform(40, 220, (6, 8, 3))
+    room = cv2.resize(np.kron(patches, np.ones((40, 40, 1))), size).astype(np.float32)
+    picture = compose(sprite, room).clip(0, 255).astype(np.uint8)
+    return cv2.imencode(".jpg", picture)[1].tobytes()
 
 
 def test_gestures_are_enrolled_listed_exported_and_imported(tmp_path: Path, photo: Path) -> None:
@@ -78,6 +89,26 @@ def test_a_photo_without_a_hand_is_refused_and_nothing_is_enrolled(
     assert len(rows) == 10
 
 
+def test_enrolling_says_what_is_wrong_and_what_may_be_confused(tmp_path: Path, photo: Path) -> None:
+    data = ("--data-dir", str(tmp_path / "data"))
+    action = ("--action", '{"type":"home"}')
+    blurred = tmp_path / "blurred.jpg"
+    picture = cv2.imread(str(photo))
+    assert picture is not None
+    cv2.imwrite(str(blurred), cv2.GaussianBlur(picture, (0, 0), 10))
+    told = farhand("enroll", "x", str(blurred), *action, *data, fails=True).stderr
+    assert f"{blurred}: the picture is blurred" in told
+    said = farhand("enroll", "x", str(photo), *action, *data, "--inactive").stdout
+    assert "enrolled 'x' with 1 samples, inactive" in said
+    assert "likely to be taken for 'home'" in said
+    assert "choose another sign" in said
+    assert "(inactive)" in farhand("gestures", "list", *data).stdout
+    files = [str(photo), str(photo), str(blurred)]
+    said = farhand("enroll", "y", *files, *action, *data, "--burst").stdout
+    assert "left out: 1 near duplicate, 1 blurred" in said
+    assert "enrolled 'y' with 1 samples" in said
+
+
 def test_evaluate_prints_json(tmp_path: Path) -> None:
     for name in ("up", "stop"):
         folder = tmp_path / "set" / name
@@ -113,6 +144,8 @@ def test_the_wheel_works_in_an_empty_folder(tmp_path: Path) -> None:
     subprocess.run(build, check=True, capture_output=True, cwd=ROOT)
     (wheel,) = tmp_path.glob("*.whl")
     with zipfile.ZipFile(wheel) as archive:
+        for network in ("hand_mask.onnx", "hand_shape.onnx"):
+            assert f"app/pipeline/models/{network}" in archive.namelist()
         archive.extractall(tmp_path / "site")
     empty = tmp_path / "empty"
     empty.mkdir()
@@ -126,6 +159,11 @@ def test_the_wheel_works_in_an_empty_folder(tmp_path: Path) -> None:
         assert len(gestures) == 10
         video = httpx.get(server.url + "/static/media/operator.webm", headers=signed_in)
         assert video.content[:4] == b"\x1aE\xdf\xa3"
+        # By network, since the photo shows a room.
+        answer = httpx.post(
+            server.url + "/api/recognise", headers=signed_in, content=hand_in_a_room(), timeout=30
+        ).json()
+        assert answer["roi"] is not None, answer
         robot = httpx.get(server.url + "/api/robots", headers=signed_in).json()[0]
         assert robot["online"], robot
         where = server.node().environ()["PYTHONPATH"]

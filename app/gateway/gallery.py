@@ -69,7 +69,7 @@ class Enrolled:
     version: int
     matcher: PcaMatcher
     actions: dict[str, Action] = field(default_factory=dict)
-    """By the gesture's name."""
+    """By the active gesture's name."""
 
 
 class LiveGallery:
@@ -104,7 +104,10 @@ class LiveGallery:
         version = self._store.version
         gestures = self._store.list()
         pairs = [
-            (gesture.name, sample.template) for gesture in gestures for sample in gesture.samples
+            (gesture.name, sample.template)
+            for gesture in gestures
+            if gesture.active
+            for sample in gesture.samples
         ]
-        actions = {gesture.name: gesture.action for gesture in gestures}
+        actions = {gesture.name: gesture.action for gesture in gestures if gesture.active}
         return Enrolled(version, fit(pairs, self._settings), actions)

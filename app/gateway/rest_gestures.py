@@ -10,13 +10,22 @@ from starlette.responses import Response
 
 from app.config import PipelineSettings
 from app.errors import ImageRefused, Invalid, NotFound
+from app.gateway.bodies import CHECK_BODY, ENROL_BODY, IMAGE_BODY, PATCH_BODY, SAMPLES_BODY
+from app.gateway.enrolment import (
+    Judged,
+    confusions_json,
+    judge,
+    judge_for_enrolment,
+    matrix_json,
+    run,
+)
 from app.gateway.errors import describe_validation
 from app.gateway.gallery import Enrolled
-from app.gateway.uploads import UnsupportedMedia, read_image, read_upload
+from app.gateway.uploads import UnsupportedMedia, read_enrolment, read_image
 from app.gestures import Gesture, template_png
 from app.gestures.records import clean_name
 from app.link.actions import ACTION, Action
-from app.pipeline import extract_template, pack_template
+from app.pipeline import extract_template
 
 if TYPE_CHECKING:
     from app.gateway.hub import Hub
@@ -25,57 +34,6 @@ router = APIRouter(prefix="/api", tags=["gestures"])
 
 MAX_JSON = 64 * 1024
 
-_IMAGES = {"type": "array", "items": {"type": "string", "format": "binary"}}
-_ENROL_BODY = {
-    "required": True,
-    "content": {
-        "multipart/form-data": {
-            "schema": {
-                "type": "object",
-                "required": ["name", "action", "images"],
-                "properties": {
-                    "name": {"type": "string"},
-                    "action": {"type": "string", "description": "an action as JSON"},
-                    "images": _IMAGES,
-                },
-            }
-        }
-    },
-}
-_SAMPLES_BODY = {
-    "required": True,
-    "content": {
-        "multipart/form-data": {
-            "schema": {"type": "object", "required": ["images"], "properties": {"images": _IMAGES}}
-        }
-    },
-}
-_IMAGE_BODY = {
-    "required": True,
-    "content": {
-        "multipart/form-data": {
-            "schema": {
-                "type": "object",
-                "required": ["image"],
-                "properties": {"image": {"type": "string", "format": "binary"}},
-            }
-        },
-        "image/*": {"schema": {"type": "string", "format": "binary"}},
-    },
-}
-_PATCH_BODY = {
-    "required": True,
-    "content": {
-        "application/json": {
-            "schema": {
-                "type": "object",
-                "properties": {"name": {"type": "string"}, "action": {"type": "object"}},
-                "additionalProperties": False,
-            }
-        }
-    },
-}
-
 
 def gesture_json(gesture: Gesture) -> dict[str, Any]:
     """A gesture as the REST interface shows it."""
@@ -83,6 +41,7 @@ def gesture_json(gesture: Gesture) -> dict[str, Any]:
         "id": gesture.id,
         "name": gesture.name,
         "action": ACTION.dump_python(gesture.action, mode="json", exclude_none=True),
+        "active": gesture.active,
         "samples": len(gesture.samples),
         "sample_ids": [sample.id for sample in gesture.samples],
         "created": gesture.created.isoformat(),
@@ -122,27 +81,6 @@ def parse_action(value: Any) -> Action:
         raise Invalid(f"action: {error}"[:300], code="bad_action") from None
 
 
-def _extract(images: list[bytes], settings: PipelineSettings) -> list[bytes]:
-    """The packed template of every image; refuses all when one shows no hand."""
-    templates = []
-    for number, image in enumerate(images, start=1):
-        try:
-            templates.append(pack_template(extract_template(image, settings).template))
-        except ImageRefused as error:
-            error.detail["image"] = number
-            if len(images) > 1:
-                error.message = f"image {number}: {error.message}"
-            raise
-    return templates
-
-
-async def _templates(hub: "Hub", images: list[bytes]) -> list[bytes]:
-    if not images:
-        raise Invalid("at least one image is needed in 'images'", field="images")
-    loop = asyncio.get_running_loop()
-    return await loop.run_in_executor(hub.images, _extract, images, hub.settings.pipeline)
-
-
 def _hub(request: Request) -> "Hub":
     hub: Hub = request.app.state.hub
     return hub
@@ -159,7 +97,7 @@ async def list_gestures(request: Request) -> list[dict[str, Any]]:
     "/gestures",
     status_code=201,
     summary="Enrol a gesture",
-    openapi_extra={"requestBody": _ENROL_BODY},
+    openapi_extra={"requestBody": ENROL_BODY},
     responses={
         409: {"description": "the name is taken"},
         413: {"description": "too many bytes"},
@@ -167,21 +105,94 @@ async def list_gestures(request: Request) -> list[dict[str, Any]]:
     },
 )
 async def create_gesture(request: Request, response: Response) -> dict[str, Any]:
-    """Enrol a gesture from one or more images: whole, or not at all."""
+    """Enrol a gesture from one or more images: whole, or not at all.
+
+    With ``burst`` the images are the frames of a few seconds, of which the best are kept.
+    """
     hub = _hub(request)
-    upload = await read_upload(request, hub.settings.gateway.max_upload_bytes, "images")
+    upload = await read_enrolment(request, hub.settings.gateway, {"name", "action", "active"})
     for field in ("name", "action"):
         if field not in upload.fields:
             raise Invalid(f"the field {field!r} is missing", field=field)
-    if unknown := upload.fields.keys() - {"name", "action"}:
-        raise Invalid(f"the field {min(unknown)!r} is not known", field=min(unknown))
+    active = upload.flag("active", True)
     name = clean_name(upload.fields["name"])
     action = parse_action(parse_json(upload.fields["action"], "action"))
-    templates = await _templates(hub, upload.images)
-    gesture = await asyncio.to_thread(hub.store.create, name, action, templates)
+    judged = await judge_for_enrolment(hub, upload.images, burst=upload.burst)
+    confusions = await _confusions(hub, name, judged.templates)
+    gesture = await asyncio.to_thread(
+        hub.store.create, name, action, judged.templates, active=active
+    )
     await hub.gallery_changed()
     response.headers["Location"] = f"/api/gestures/{gesture.id}"
-    return gesture_json(gesture)
+    return _enrolled_json(gesture, judged, upload.burst, confusions)
+
+
+async def _confusions(
+    hub: "Hub", name: str, templates: list[bytes], besides: str | None = None
+) -> list[dict[str, Any]]:
+    gestures = await asyncio.to_thread(hub.store.list)
+    settings, threshold = hub.settings.pipeline, hub.gallery.current.matcher.max_distance
+    return await run(hub, confusions_json, gestures, settings, threshold, name, templates, besides)
+
+
+def _enrolled_json(
+    gesture: Gesture, judged: Judged, burst: bool, confusions: list[dict[str, Any]]
+) -> dict[str, Any]:
+    answer = {**gesture_json(gesture), "images": judged.images_json(), "confusions": confusions}
+    return {**answer, "burst": judged.burst_json()} if burst else answer
+
+
+@router.post(
+    "/gestures/check",
+    summary="Judge images as enrolment would; nothing is stored",
+    openapi_extra={"requestBody": CHECK_BODY},
+    responses={
+        404: {"description": "unknown id in 'gesture'"},
+        413: {"description": "too many bytes"},
+        422: {"description": "a bad name or action, or no image"},
+    },
+)
+async def check_gesture(request: Request) -> dict[str, Any]:
+    """Judge images before they are enrolled: are they good, and what may be confused with them?"""
+    hub = _hub(request)
+    known = {"name", "action", "active", "gesture"}
+    upload = await read_enrolment(request, hub.settings.gateway, known)
+    upload.flag("active", True)
+    name, besides, samples = "the new gesture", None, []
+    if "gesture" in upload.fields:
+        gesture = await asyncio.to_thread(hub.store.get, upload.fields["gesture"])
+        name, besides = gesture.name, gesture.id
+        samples = [sample.template for sample in gesture.samples]
+    if "name" in upload.fields:
+        name = clean_name(upload.fields["name"])
+    if "action" in upload.fields:
+        parse_action(parse_json(upload.fields["action"], "action"))
+    judged = await judge(hub, upload.images, burst=upload.burst)
+    confusions: list[dict[str, Any]] = []
+    if judged.kept:
+        confusions = await _confusions(hub, name, samples + judged.templates, besides)
+    return {
+        "images": judged.images_json(),
+        "accepted": len(judged.kept),
+        "left_out": judged.left_out,
+        "confusions": confusions,
+        "threshold": hub.gallery.current.matcher.max_distance,
+    }
+
+
+@router.get("/gestures/confusions", summary="Which gestures may be taken for one another")
+async def list_confusions(request: Request) -> dict[str, Any]:
+    """All gestures against all others, active or not, and what would help."""
+    hub = _hub(request)
+    version = await asyncio.to_thread(lambda: hub.store.version)
+    cached: tuple[int, dict[str, Any]] | None = getattr(request.app.state, "confusions", None)
+    if cached is not None and cached[0] == version:
+        return cached[1]
+    gestures = await asyncio.to_thread(hub.store.list)
+    threshold = hub.gallery.current.matcher.max_distance
+    answer = await run(hub, matrix_json, gestures, hub.settings.pipeline, threshold)
+    request.app.state.confusions = version, answer
+    return answer
 
 
 @router.get("/gestures/{id}", summary="One gesture", responses={404: {"description": "unknown id"}})
@@ -192,8 +203,8 @@ async def get_gesture(request: Request, id: str) -> dict[str, Any]:
 
 @router.patch(
     "/gestures/{id}",
-    summary="Change a gesture's name or action",
-    openapi_extra={"requestBody": _PATCH_BODY},
+    summary="Change a gesture's name or action, or whether it is active",
+    openapi_extra={"requestBody": PATCH_BODY},
     responses={
         404: {"description": "unknown id"},
         409: {"description": "the name is taken"},
@@ -201,7 +212,10 @@ async def get_gesture(request: Request, id: str) -> dict[str, Any]:
     },
 )
 async def update_gesture(request: Request, id: str) -> dict[str, Any]:
-    """Change the name, the action or both: ``{"name": ..., "action": {...}}``."""
+    """Change what is named: ``{"name": ..., "action": {...}, "active": true}``.
+
+    The answer to ``active`` also says what the gesture may be confused with.
+    """
     hub = _hub(request)
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind != "application/json":
@@ -212,15 +226,28 @@ async def update_gesture(request: Request, id: str) -> dict[str, Any]:
         if len(body) > MAX_JSON:
             raise Invalid(f"the JSON may have {MAX_JSON} bytes", field="body")
     changes = parse_json(bytes(body), "body")
-    if not isinstance(changes, dict) or not changes or changes.keys() - {"name", "action"}:
-        raise Invalid("send a JSON object with 'name', 'action' or both", field="body")
+    if (
+        not isinstance(changes, dict)
+        or not changes
+        or changes.keys() - {"name", "action", "active"}
+    ):
+        raise Invalid(
+            "send a JSON object with one or more of 'name', 'action' and 'active'", field="body"
+        )
     name = changes.get("name")
     if "name" in changes and not isinstance(name, str):
         raise Invalid("the name must be a string", field="name")
+    active = changes.get("active")
+    if "active" in changes and not isinstance(active, bool):
+        raise Invalid("active must be true or false", field="active")
     action = parse_action(changes["action"]) if "action" in changes else None
-    gesture = await asyncio.to_thread(hub.store.update, id, name=name, action=action)
+    gesture = await asyncio.to_thread(hub.store.update, id, name=name, action=action, active=active)
     await hub.gallery_changed()
-    return gesture_json(gesture)
+    if active is None:
+        return gesture_json(gesture)
+    templates = [sample.template for sample in gesture.samples]
+    confusions = await _confusions(hub, gesture.name, templates, gesture.id)
+    return {**gesture_json(gesture), "confusions": confusions}
 
 
 @router.delete(
@@ -241,7 +268,7 @@ async def delete_gesture(request: Request, id: str) -> Response:
     "/gestures/{id}/samples",
     status_code=201,
     summary="Enrol more images of a gesture",
-    openapi_extra={"requestBody": _SAMPLES_BODY},
+    openapi_extra={"requestBody": SAMPLES_BODY},
     responses={
         404: {"description": "unknown id"},
         413: {"description": "too many bytes"},
@@ -249,16 +276,16 @@ async def delete_gesture(request: Request, id: str) -> Response:
     },
 )
 async def add_samples(request: Request, id: str) -> dict[str, Any]:
-    """Enrol more images of a gesture: all of them, or none."""
+    """Enrol more images of a gesture: all of them, or none; of a burst the best."""
     hub = _hub(request)
-    await asyncio.to_thread(hub.store.get, id)
-    upload = await read_upload(request, hub.settings.gateway.max_upload_bytes, "images")
-    if upload.fields:
-        raise Invalid(f"the field {min(upload.fields)!r} is not known", field=min(upload.fields))
-    templates = await _templates(hub, upload.images)
-    gesture = await asyncio.to_thread(hub.store.add_samples, id, templates)
+    gesture = await asyncio.to_thread(hub.store.get, id)
+    upload = await read_enrolment(request, hub.settings.gateway, set())
+    judged = await judge_for_enrolment(hub, upload.images, burst=upload.burst)
+    templates = [*(sample.template for sample in gesture.samples), *judged.templates]
+    confusions = await _confusions(hub, gesture.name, templates, id)
+    gesture = await asyncio.to_thread(hub.store.add_samples, id, judged.templates)
     await hub.gallery_changed()
-    return gesture_json(gesture)
+    return _enrolled_json(gesture, judged, upload.burst, confusions)
 
 
 @router.get(
@@ -307,7 +334,7 @@ def _recognise(image: bytes, settings: PipelineSettings, enrolled: Enrolled) -> 
 @router.post(
     "/recognise",
     summary="Which gesture does an image show?",
-    openapi_extra={"requestBody": _IMAGE_BODY},
+    openapi_extra={"requestBody": IMAGE_BODY},
     responses={
         413: {"description": "too many bytes"},
         422: {"description": "not an image"},

@@ -6,9 +6,12 @@ from fastapi import Request
 from starlette.datastructures import UploadFile
 from starlette.types import Message
 
+from app.config import GatewaySettings
 from app.errors import Invalid, RequestError, TooLarge
 
 MAX_IMAGES = 50
+MAX_BURST = 120
+"""Images of a burst."""
 OVERHEAD = 64 * 1024
 """Bytes of multipart wrapping that do not count."""
 
@@ -26,6 +29,22 @@ class Upload:
 
     fields: dict[str, str]
     images: list[bytes]
+
+    @property
+    def burst(self) -> bool:
+        """Whether the images are the frames of one burst."""
+        return self.flag("burst", False)
+
+    def flag(self, name: str, default: bool) -> bool:
+        """A field that is ``true`` or ``false``.
+
+        Raises:
+            Invalid: it is something else.
+        """
+        text = self.fields.get(name, str(default).lower())
+        if text not in ("true", "false"):
+            raise Invalid(f"{name} is true or false, not {text[:40]!r}", field=name)
+        return text == "true"
 
 
 def _too_large(limit: int) -> TooLarge:
@@ -52,13 +71,47 @@ def _limited(request: Request, limit: int) -> Request:
     return Request(request.scope, receive)
 
 
-async def read_upload(request: Request, limit: int, image_field: str) -> Upload:
+async def read_enrolment(request: Request, settings: GatewaySettings, known: set[str]) -> Upload:
+    """Read a multipart body with ``images``; with the field ``burst`` more and larger ones.
+
+    Which fields there are shows only at the end of the body, so what is too much for anything but
+    a burst is refused then.
+
+    Args:
+        request: The request, its body unread.
+        settings: The limits.
+        known: Names of the text fields that are allowed beside ``burst``.
+
+    Raises:
+        TooLarge, UnsupportedMedia: as :func:`read_upload`.
+        Invalid: a field that is not known, or no image, or too many.
+    """
+    most = max(settings.max_burst_bytes, settings.max_upload_bytes)
+    upload = await read_upload(request, most, "images", MAX_BURST)
+    if unknown := upload.fields.keys() - known - {"burst"}:
+        raise Invalid(f"the field {min(unknown)!r} is not known", field=min(unknown))
+    if not upload.burst:
+        if sum(map(len, upload.images)) > settings.max_upload_bytes:
+            raise _too_large(settings.max_upload_bytes)
+        if len(upload.images) > MAX_IMAGES:
+            raise Invalid(
+                f"{len(upload.images)} images given; at most {MAX_IMAGES} are allowed, and "
+                f"{MAX_BURST} with burst=true",
+                field="images",
+            )
+    return upload
+
+
+async def read_upload(
+    request: Request, limit: int, image_field: str, most_images: int = MAX_IMAGES
+) -> Upload:
     """Read a multipart body with text fields and images.
 
     Args:
         request: The request, its body unread.
         limit: Bytes allowed in all.
         image_field: Name of the fields that hold images.
+        most_images: Files allowed.
 
     Raises:
         TooLarge: over the limit; raised as soon as it is.
@@ -71,7 +124,7 @@ async def read_upload(request: Request, limit: int, image_field: str) -> Upload:
     fields: dict[str, str] = {}
     images: list[bytes] = []
     limited = _limited(request, limit)
-    async with limited.form(max_files=MAX_IMAGES, max_fields=8) as form:
+    async with limited.form(max_files=most_images, max_fields=8) as form:
         for name, value in form.multi_items():
             if isinstance(value, UploadFile):
                 if name != image_field:

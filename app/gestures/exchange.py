@@ -20,7 +20,10 @@ def export_set(store: GestureStore, target: Path) -> int:
     write_set(
         (
             NewGesture(
-                gesture.name, gesture.action, tuple(sample.template for sample in gesture.samples)
+                gesture.name,
+                gesture.action,
+                tuple(sample.template for sample in gesture.samples),
+                gesture.active,
             )
             for gesture in gestures
         ),

@@ -46,6 +46,8 @@ class Gesture:
     created: datetime
     updated: datetime
     """UTC, in steps of a millisecond."""
+    active: bool = True
+    """Whether it is matched. An inactive gesture is kept and listed, and moves nothing."""
 
 
 def clean_name(name: str) -> str:
@@ -115,3 +117,4 @@ class NewGesture:
     name: str
     action: Action
     templates: tuple[bytes, ...]
+    active: bool = True

@@ -10,8 +10,8 @@
     samples = ["forward/01.png", "forward/02.png"]
 
 Sample paths are relative to ``gestures.toml``, with forward slashes, and stay below it. Actions
-are those of :mod:`app.link.actions`. Nothing else is allowed: what is misspelt is refused, not
-ignored.
+are those of :mod:`app.link.actions`. ``active = false`` marks a gesture that is not
+matched. Nothing else is allowed: what is misspelt is refused, not ignored.
 """
 
 import json
@@ -126,6 +126,7 @@ def _files(gestures: Iterable[NewGesture]) -> dict[str, bytes]:
         action = ACTION.dump_python(gesture.action, mode="json", exclude_none=True)
         index.append(
             f"\n[[gesture]]\nname = {_toml(gesture.name)}\naction = {_toml(action)}\n"
+            f"{'' if gesture.active else f'active = false{chr(10)}'}"
             f"samples = [\n{''.join(f'  {_toml(sample)},{chr(10)}' for sample in samples)}]\n"
         )
     return {INDEX: "".join(index).encode(), **files}
@@ -189,7 +190,10 @@ def _gesture(read: Read, table: dict[str, Any], where: str) -> NewGesture:
     except Invalid as error:
         raise Invalid(f"{where}: {error.message}") from error
     where = f"{where} ({name})"
-    _no_others(table, ("name", "action", "samples"), where)
+    _no_others(table, ("name", "action", "active", "samples"), where)
+    active = table.get("active", True)
+    if not isinstance(active, bool):
+        raise Invalid(f"{where}: active is true or false, not {active!r}")
     if not isinstance(samples, list) or not all(isinstance(path, str) for path in samples):
         raise Invalid(f"{where}: samples is missing, or is not a list of paths")
     action = _action(table.get("action"), where)
@@ -199,7 +203,7 @@ def _gesture(read: Read, table: dict[str, Any], where: str) -> NewGesture:
             templates.append(read_template(read(_safe(path), PNG_MAX_BYTES)))
         except Invalid as error:
             raise Invalid(f"{where}: sample {path!r} {error.message}") from error
-    return NewGesture(name, action, _checked(templates, where))
+    return NewGesture(name, action, _checked(templates, where), active)
 
 
 def _checked(templates: Sequence[bytes], where: str) -> tuple[bytes, ...]:

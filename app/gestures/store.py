@@ -110,25 +110,31 @@ class GestureStore:
             return self._record(self._row(session, id))
 
     def templates(self) -> builtins.list[tuple[str, bytes]]:
-        """Name and template (600 bytes) of every sample, in a stable order."""
+        """Name and template (600 bytes) of every active sample, in a stable order."""
         return [
-            (gesture.name, sample.template) for gesture in self.list() for sample in gesture.samples
+            (gesture.name, sample.template)
+            for gesture in self.list()
+            if gesture.active
+            for sample in gesture.samples
         ]
 
-    def create(self, name: str, action: Action, templates: Sequence[bytes]) -> Gesture:
+    def create(
+        self, name: str, action: Action, templates: Sequence[bytes], *, active: bool = True
+    ) -> Gesture:
         """Enrol a gesture.
 
         Args:
             name: Made NFC and trimmed; 1 to 60 printable characters.
             action: What it makes the robot do.
             templates: At least one, 600 bytes each.
+            active: Whether it is matched from now on.
 
         Raises:
             Invalid: the name or a template is not what it should be, or there are too many.
             Duplicate: the name is taken, upper and lower case being the same.
             StorageFull: no space is left; nothing was changed.
         """
-        entry = NewGesture(clean_name(name), action, check_templates(templates))
+        entry = NewGesture(clean_name(name), action, check_templates(templates), active)
         with self._write() as session:
             return self._put(session, [entry], replace=False)[0]
 
@@ -146,14 +152,23 @@ class GestureStore:
             Invalid, Duplicate, StorageFull: as in :meth:`create`.
         """
         checked = [
-            NewGesture(clean_name(entry.name), entry.action, check_templates(entry.templates))
+            NewGesture(
+                clean_name(entry.name), entry.action, check_templates(entry.templates), entry.active
+            )
             for entry in entries
         ]
         with self._write() as session:
             return self._put(session, checked, replace=replace)
 
-    def update(self, id: str, *, name: str | None = None, action: Action | None = None) -> Gesture:
-        """Change a gesture's name, its action or both.
+    def update(
+        self,
+        id: str,
+        *,
+        name: str | None = None,
+        action: Action | None = None,
+        active: bool | None = None,
+    ) -> Gesture:
+        """Change a gesture's name, its action, or whether it is matched; None leaves it.
 
         Raises:
             NotFound: no gesture has this id.
@@ -167,6 +182,8 @@ class GestureStore:
                 row.name, row.name_key = clean, name_key(clean)
             if action is not None:
                 row.action = ACTION.dump_json(action).decode()
+            if active is not None:
+                row.active = active
             return self._touch(session, row)
 
     def add_samples(self, id: str, templates: Sequence[bytes]) -> Gesture:
@@ -210,6 +227,7 @@ class GestureStore:
                 self._check_free(session, entry.name)
             row.name, row.name_key = entry.name, name_key(entry.name)
             row.action = ACTION.dump_json(entry.action).decode()
+            row.active = entry.active
             row.samples.clear()
             self._append(row, entry.templates)
             row.updated_ms = now
@@ -277,9 +295,8 @@ class GestureStore:
             Sample(sample.id, bytes(sample.template), _time(sample.created_ms))
             for sample in row.samples
         )
-        return Gesture(
-            row.id, row.name, action, samples, _time(row.created_ms), _time(row.updated_ms)
-        )
+        created, updated = _time(row.created_ms), _time(row.updated_ms)
+        return Gesture(row.id, row.name, action, samples, created, updated, row.active)
 
     # -- transactions --------------------------------------------------------------------------
 
@@ -312,7 +329,9 @@ def _time(ms: int) -> datetime:
 
 def _gesture_checksum(row: GestureRow) -> int:
     fields = (row.id, row.name, row.name_key, row.action, row.created_ms, row.updated_ms)
-    return zlib.crc32(repr(fields).encode())
+    # Added only where it says something: rows older than the column keep their checksums.
+    state = () if row.active else ("inactive",)
+    return zlib.crc32(repr(fields + state).encode())
 
 
 def _sample_checksum(row: SampleRow) -> int:

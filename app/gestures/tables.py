@@ -1,6 +1,6 @@
 """The gesture database's tables. A change here needs a new script in ``migrations/versions``."""
 
-from sqlalchemy import BigInteger, ForeignKey, Integer, LargeBinary, String, Text
+from sqlalchemy import BigInteger, Boolean, ForeignKey, Integer, LargeBinary, String, Text, true
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
 
 
@@ -22,6 +22,8 @@ class GestureRow(Base):
     """JSON of :data:`app.link.actions.Action`."""
     created_ms: Mapped[int] = mapped_column(BigInteger)
     updated_ms: Mapped[int] = mapped_column(BigInteger)
+    active: Mapped[bool] = mapped_column(Boolean, server_default=true())
+    """Whether it is matched."""
     checksum: Mapped[int] = mapped_column(BigInteger)
     """CRC-32 of the other columns: a damaged action must never move a robot."""
     samples: Mapped[list["SampleRow"]] = relationship(

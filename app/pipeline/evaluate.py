@@ -1,7 +1,8 @@
 """Evaluate: how well the product's own pipeline tells labelled photographs apart.
 
-In each trial some photographs a label are enrolled at random and the rest are recognised. Every
-photograph takes the way of an enrolment: :func:`~app.pipeline.still.extract_template`.
+In each trial some photographs a label are enrolled at random and others are recognised. Every
+photograph takes the way of an enrolment: :func:`~app.pipeline.still.extract_template`. Who is drawn
+is up to :mod:`app.pipeline.trials`.
 """
 
 from collections import Counter
@@ -14,8 +15,10 @@ import numpy as np
 
 from app.config import PipelineSettings
 from app.errors import ImageRefused, Invalid, NotFound, TooLarge
+from app.pipeline.curve import NO_HAND, accept_curve, no_curve
 from app.pipeline.match import Gallery, Matched, PcaMatcher
 from app.pipeline.still import extract_template
+from app.pipeline.trials import draw_trial, groups_of
 from app.pipeline.types import Extraction
 
 SUFFIXES = frozenset((".jpg", ".jpeg", ".png", ".webp"))
@@ -82,6 +85,8 @@ def evaluate(
     reject: bool = False,
     unknown: Path | None = None,
     settings: PipelineSettings | None = None,
+    group: str | None = None,
+    holdout_labels: int = 0,
 ) -> dict[str, Any]:
     """Measure the recognition on ``directory/LABEL/*.jpg``.
 
@@ -91,9 +96,15 @@ def evaluate(
         trials: Random choices of them.
         seed: Of the choice; the same seed gives the same figures.
         reject: Let the matcher call a hand unknown. Off: forced choice.
-        unknown: Folder of photographs, ``LABEL/*.jpg``, of labels that are not enrolled. With
-            ``reject`` off all of them are accepted by definition.
+        unknown: Folder of photographs, ``LABEL/*.jpg``; those of labels that ``directory`` has,
+            too, are left out. With ``reject`` off all in which a hand is found are accepted by
+            definition.
         settings: Of the pipeline; None for the product's defaults.
+        group: Regular expression that finds a photograph's room or person in its file name, see
+            :func:`~app.pipeline.trials.groups_of`. In each trial one half of the groups is
+            enrolled from and the other half asked about, the unknown too.
+        holdout_labels: So many labels, drawn anew in each trial, are not enrolled; their
+            photographs count as unknown.
 
     Returns:
         JSON-compatible, as in docs/protocol.md. A picture without a hand counts as wrong when it
@@ -105,87 +116,147 @@ def evaluate(
         Invalid: no pictures, too few a label, or arguments out of bounds.
     """
     settings = settings or PipelineSettings()
+    images = find_images(directory)
+    _check(images, shots, trials, holdout_labels)
+    others = _others(unknown, images)
+    paths = [path for listed in images.values() for path in listed]
+    groups = None if group is None else groups_of(paths, group)
+    photos = load_photos(images, settings)
+    strangers = load_photos(others, settings)
+    apart = None if group is None else groups_of((photo.path for photo in strangers), group)
+
+    rng = np.random.default_rng(seed)
+    labels, usable = [p.label for p in photos], [p.hand is not None for p in photos]
+    tally = Tally(list(images))
+    for _ in range(trials):
+        trial = draw_trial(labels, groups, shots, holdout_labels, rng)
+        enrolled = {i for mine in trial.enrol(shots, usable).values() for i in mine}
+        matcher = PcaMatcher.fit(_gallery(photos[i] for i in sorted(enrolled)), settings.match)
+        tally.next_trial()
+        for i in trial.asked:
+            if i not in enrolled:
+                matched, ms = _ask(matcher, photos[i])
+                tally.known(photos[i], matched, ms, reject, None if groups is None else groups[i])
+        asked = [photos[i] for i in trial.strangers]
+        asked += [p for k, p in enumerate(strangers) if not apart or apart[k] not in trial.closed]
+        for photo in asked:
+            tally.unknown(_ask(matcher, photo)[0], reject)
+    return {
+        "directory": str(directory),
+        "labels": list(images),
+        "images": len(photos),
+        "no_hand": usable.count(False),
+        "shots": shots,
+        "trials": trials,
+        "seed": seed,
+        "reject": reject,
+        "group": group,
+        "groups": None if groups is None else len(set(groups)),
+        "holdout_labels": holdout_labels,
+        "unknown_images": len(strangers),
+        **tally.figures(),
+    }
+
+
+def _check(images: dict[str, list[Path]], shots: int, trials: int, holdout_labels: int) -> None:
     if shots < 1 or trials < 1:
         raise Invalid(f"{shots} shots and {trials} trials: at least 1 of each is needed")
-    images = find_images(directory)
     few = {label: len(paths) for label, paths in images.items() if len(paths) <= shots}
     if few:
         listed = ", ".join(f"{label} ({count})" for label, count in few.items())
         raise Invalid(
             f"too few pictures for {shots} shots: {listed}; at least {shots + 1} a label are needed"
         )
-    photos = load_photos(images, settings)
-    strangers = []
-    if unknown is not None:
-        others = {k: v for k, v in find_images(unknown).items() if k not in images}
-        if not others:
-            raise Invalid(f"every label in {unknown} is enrolled: others are needed")
-        strangers = load_photos(others, settings)
-
-    rng = np.random.default_rng(seed)
-    accuracies: list[float] = []
-    confusion: dict[str, Counter[str]] = {label: Counter() for label in images}
-    rejected = accepted_strangers = asked = 0
-    times: list[float] = []
-    for _ in range(trials):
-        enrolled = _draw(photos, images, shots, rng)
-        gallery = _gallery(photos[i] for i in sorted(enrolled))
-        matcher = PcaMatcher.fit(gallery, settings.match)
-        right = count = 0
-        for index, photo in enumerate(photos):
-            if index in enrolled:
-                continue
-            matched, ms = _ask(matcher, photo)
-            times.append(ms)
-            answer = _answer(matched, reject)
-            confusion[photo.label][answer] += 1
-            rejected += answer == UNKNOWN
-            right += answer == photo.label
-            count += 1
-        asked += count
-        accuracies.append(right / count)
-        accepted_strangers += sum(
-            _answer(_ask(matcher, photo)[0], reject) != UNKNOWN for photo in strangers
+    if not 0 <= holdout_labels < len(images):
+        raise Invalid(
+            f"{holdout_labels} of {len(images)} labels cannot be left out: "
+            f"0 to {len(images) - 1} are possible"
         )
-    p50, p99 = np.percentile(times, (50, 99))
-    return {
-        "directory": str(directory),
-        "labels": list(images),
-        "images": len(photos),
-        "no_hand": sum(photo.hand is None for photo in photos),
-        "shots": shots,
-        "trials": trials,
-        "seed": seed,
-        "reject": reject,
-        "accuracy": {
-            "mean": round(float(np.mean(accuracies)), 4),
-            "std": round(float(np.std(accuracies)), 4),
-        },
-        "per_label": {
-            label: round(row[label] / row.total(), 4) if row.total() else None
-            for label, row in confusion.items()
-        },
-        "confusion": {label: dict(row) for label, row in confusion.items()},
-        "rejected": round(rejected / asked, 4),
-        "unknown_images": len(strangers),
-        "unknown_accepted": (
-            round(accepted_strangers / (len(strangers) * trials), 4) if strangers else None
-        ),
-        "ms_per_image": {"p50": round(float(p50), 3), "p99": round(float(p99), 3)},
-    }
 
 
-def _draw(
-    photos: list[Photo], images: dict[str, list[Path]], shots: int, rng: np.random.Generator
-) -> set[int]:
-    """Indices of the enrolled photographs; those with a hand are preferred."""
-    enrolled: set[int] = set()
-    for label in images:
-        mine = [i for i, photo in enumerate(photos) if photo.label == label]
-        shuffled = [mine[k] for k in rng.permutation(len(mine))]
-        shuffled.sort(key=lambda i: photos[i].hand is None)
-        enrolled.update(shuffled[:shots])
-    return enrolled
+def _others(unknown: Path | None, images: dict[str, list[Path]]) -> dict[str, list[Path]]:
+    """Pictures of ``unknown`` whose labels are never enrolled."""
+    if unknown is None:
+        return {}
+    others = {k: v for k, v in find_images(unknown).items() if k not in images}
+    if not others:
+        raise Invalid(f"every label in {unknown} is enrolled: others are needed")
+    return others
+
+
+class Tally:
+    """What became of the photographs asked about, over all trials."""
+
+    def __init__(self, labels: list[str]) -> None:
+        self._confusion: dict[str, Counter[str]] = {label: Counter() for label in labels}
+        self._groups: dict[str, list[bool]] = {}
+        self._trials: list[list[bool]] = []
+        self._times: list[float] = []
+        self._strange: list[float] = []
+        self._nearest_right: list[bool] = []
+        self._strangers: list[float] = []
+        self._strangers_accepted = 0
+
+    def next_trial(self) -> None:
+        """What follows belongs to a new trial."""
+        self._trials.append([])
+
+    def known(
+        self, photo: Photo, matched: Matched, ms: float, reject: bool, group: str | None
+    ) -> None:
+        """A photograph of an enrolled label was asked about."""
+        answer = _answer(matched, reject)
+        self._confusion[photo.label][answer] += 1
+        self._trials[-1].append(answer == photo.label)
+        if group is not None:
+            self._groups.setdefault(group, []).append(answer == photo.label)
+        self._times.append(ms)
+        self._strange.append(_strangeness(matched))
+        self._nearest_right.append(_answer(matched, reject=False) == photo.label)
+
+    def unknown(self, matched: Matched, reject: bool) -> None:
+        """A photograph of a label that is not enrolled was asked about."""
+        self._strangers_accepted += _answer(matched, reject) != UNKNOWN
+        self._strangers.append(_strangeness(matched))
+
+    def figures(self) -> dict[str, Any]:
+        """The measured part of what :func:`evaluate` returns."""
+        accuracies = [float(np.mean(trial)) for trial in self._trials]
+        rejected = sum(row[UNKNOWN] for row in self._confusion.values())
+        p50, p99 = np.percentile(self._times, (50, 99))
+        return {
+            "asked": len(self._strange),
+            "unknown_asked": len(self._strangers),
+            "accuracy": {
+                "mean": round(float(np.mean(accuracies)), 4),
+                "std": round(float(np.std(accuracies)), 4),
+            },
+            "per_label": {
+                label: round(row[label] / row.total(), 4) if row.total() else None
+                for label, row in self._confusion.items()
+            },
+            "per_group": {
+                group: round(float(np.mean(right)), 4)
+                for group, right in sorted(self._groups.items())
+            }
+            or None,
+            "confusion": {
+                label: {answer: n for answer, n in row.items() if n}
+                for label, row in self._confusion.items()
+            },
+            "rejected": round(rejected / len(self._strange), 4),
+            "unknown_accepted": (
+                round(self._strangers_accepted / len(self._strangers), 4)
+                if self._strangers
+                else None
+            ),
+            **(
+                accept_curve(self._strange, self._nearest_right, self._strangers)
+                if self._strangers
+                else no_curve()
+            ),
+            "ms_per_image": {"p50": round(float(p50), 3), "p99": round(float(p99), 3)},
+        }
 
 
 def _gallery(photos: Iterable[Photo]) -> Gallery:
@@ -208,3 +279,7 @@ def _answer(matched: Matched, reject: bool) -> str:
     if match is None or (reject and not match.accepted):
         return UNKNOWN
     return match.gesture
+
+
+def _strangeness(matched: Matched) -> float:
+    return NO_HAND if matched.match is None else matched.match.strangeness

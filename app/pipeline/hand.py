@@ -7,12 +7,14 @@ from dataclasses import dataclass, field
 from time import perf_counter
 
 from app.config import PipelineSettings
-from app.pipeline.binarise import Binarise, Binary
+from app.pipeline.binarise import Binarise
 from app.pipeline.channel import Channel
+from app.pipeline.choose import Choose
+from app.pipeline.mask import LearnedMask, Masked
 from app.pipeline.normalise import Normalise
 from app.pipeline.palm import Palm, PalmFinder
 from app.pipeline.smooth import Smooth
-from app.pipeline.types import U8
+from app.pipeline.types import U8, Way
 
 
 @dataclass
@@ -34,37 +36,83 @@ class Stopwatch:
 
 
 class FindHand:
-    """Pixels to the hand's piece of the mask."""
+    """Pixels to the hand's piece of the mask, by the way that suits the picture.
+
+    Attributes:
+        way: How the last mask was made, and why so.
+    """
 
     def __init__(self, settings: PipelineSettings) -> None:
+        self._choose = Choose(settings.binarise)
         self._channel = Channel(settings.binarise.channel)
         self._smooth = Smooth(settings.smooth)
         self._normalise = Normalise(settings.normalise)
         self._binarise = Binarise(settings.binarise)
+        self._learned: LearnedMask | None = None
         self._find_palm = PalmFinder()
         self._settings = settings.binarise
+        self._contrast = self._sure = 0.0
+        self.way = Way("threshold", "")
 
     def __call__(self, pixels: U8, watch: Stopwatch) -> Palm:
         """Find the hand in (h, w, 3) BGR or (h, w, 1) grey."""
+        self.way = self._choose(pixels)
+        watch.lap("choose")
+        if self.way.mode == "learned":
+            return self._by_network(pixels, watch)
         plane = self._channel(pixels)
         watch.lap("channel")
         smooth = self._smooth(plane)
         watch.lap("smooth")
         normalised = self._normalise(smooth)
         watch.lap("normalise")
-        self.binary: Binary = self._binarise(normalised)
+        binary = self._binarise(normalised)
+        self._contrast = binary.contrast
         watch.lap("binarise")
-        palm = self._find_palm(self.binary.mask)
+        palm = self._find_palm(binary.mask)
+        watch.lap("palm")
+        if not self._choose.unproved or self.why_none(palm) is not None:
+            return palm
+        learned = self._network(pixels)
+        # The network may have looked at a part only; the arm goes on outside of it.
+        x, y, width, height = learned.bounds
+        part = slice(y, y + height), slice(x, x + width)
+        other = self._choose.prove(palm.piece[part], learned.mask[part])
+        if other is None:
+            watch.lap("choose")
+            return palm
+        self.way = other
+        return self._by_network(pixels, watch)
+
+    def _by_network(self, pixels: U8, watch: Stopwatch) -> Palm:
+        masked = self._network(pixels)
+        self._sure = masked.sure
+        watch.lap("binarise")
+        palm = self._find_palm(masked.mask, masked.bounds)
         watch.lap("palm")
         return palm
 
+    def _network(self, pixels: U8) -> Masked:
+        # Made when first needed: with the threshold alone the network is never loaded.
+        if self._learned is None:
+            self._learned = LearnedMask()
+        return self._learned(pixels)
+
     def why_none(self, palm: Palm) -> str | None:
         """Why the piece last found is no hand, in plain words; None when it may be one."""
-        limits, binary = self._settings, self.binary
-        if binary.contrast < limits.min_contrast or not palm.found:
+        limits = self._settings
+        if self.way.mode == "learned":
+            if not palm.found:
+                return "no hand in the picture"
+            if self._sure < limits.min_sure:
+                return (
+                    "no hand in the picture: what is most like one is hardly one "
+                    f"({self._sure:.2f}, at least {limits.min_sure:.2f} needed)"
+                )
+        elif self._contrast < limits.min_contrast or not palm.found:
             return (
                 "no hand in the picture: hardly any contrast "
-                f"({binary.contrast:.1f} levels, at least {limits.min_contrast:.1f} needed)"
+                f"({self._contrast:.1f} levels, at least {limits.min_contrast:.1f} needed)"
             )
         part = palm.area / palm.piece.size
         if part < limits.min_area:

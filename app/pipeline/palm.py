@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.pipeline.types import U8, Side
+from app.pipeline.types import U8, Box, Side
 
 SIDES: tuple[Side, ...] = ("bottom", "left", "top", "right")
 MIN_CONTACT = 0.25
@@ -22,7 +22,7 @@ class Palm(NamedTuple):
         y: Of the palm's centre, pixels.
         radius: Of the largest inscribed circle, pixels; 0 when the mask is empty.
         area: Pixels of the piece.
-        arm: The side at which the piece touches the picture's border most, or None.
+        arm: The side at which the piece touches the border of what was looked at most, or None.
     """
 
     piece: U8
@@ -63,8 +63,13 @@ class PalmFinder:
         self._framed: U8 = np.empty(0, np.uint8)
         self._distance: NDArray[np.float32] = np.empty(0, np.float32)
 
-    def __call__(self, mask: U8) -> Palm:
-        """Find the palm in a (h, w) mask of 0 and 1."""
+    def __call__(self, mask: U8, bounds: Box | None = None) -> Palm:
+        """Find the palm in a (h, w) mask of 0 and 1.
+
+        ``bounds`` is the part of the picture that a learned mask covers; None for a mask of all of
+        it. A learned mask leaves sleeves out, so that a hand need not touch the border: its arm is
+        taken to come from below then.
+        """
         if self._piece.shape != mask.shape:
             self._piece = np.empty(mask.shape, np.uint8)
             framed = (mask.shape[0] + 2, mask.shape[1] + 2)
@@ -81,4 +86,11 @@ class PalmFinder:
         np.copyto(piece, mask)
         area, *_ = cv2.floodFill(piece, None, (x, y), 2)
         cv2.threshold(piece, 1, 1, cv2.THRESH_BINARY, dst=piece)
-        return Palm(piece, x, y, radius, int(area), arm_side(piece, MIN_CONTACT * radius))
+        seen = piece
+        if bounds is not None:
+            left, top, width, height = bounds
+            seen = piece[top : top + height, left : left + width]
+        arm = arm_side(seen, MIN_CONTACT * radius)
+        if arm is None and bounds is not None:
+            arm = "bottom"
+        return Palm(piece, x, y, radius, int(area), arm)

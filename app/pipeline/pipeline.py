@@ -15,6 +15,7 @@ from app.pipeline.wrist import WristCrop
 
 STAGES = (
     "decode",
+    "choose",
     "channel",
     "smooth",
     "normalise",
@@ -88,7 +89,8 @@ class Pipeline:
             watch.lap("roi")
             if box is None:
                 reason = "no hand in the picture: nothing is left above the wrist"
-        looked_at = motion.still or (self._agree.gesture is not None and motion.nearly_still)
+        held = self._agree.gesture is not None
+        looked_at = motion.still or motion.trembling or (held and motion.nearly_still)
         if reason is None and motion.fraction is None:
             reason = "waiting for three frames"
         elif reason is None and not looked_at:
@@ -103,7 +105,8 @@ class Pipeline:
             reason = matched.match.reason if matched.match else "no gesture is enrolled yet"
 
         shown = matched.match.gesture if matched.match and matched.match.accepted else None
-        event = self._agree(shown, seq, now)
+        strangeness = matched.match.strangeness if matched.match else 1.0
+        event = self._agree(shown, seq, now, strangeness=strangeness, settled=motion.settled)
         scale_x, scale_y = frame.width / palm.piece.shape[1], frame.height / palm.piece.shape[0]
         return FrameResult(
             seq=seq,
@@ -112,6 +115,7 @@ class Pipeline:
             roi=scale_box(box, scale_x, scale_y),
             wrist=scale_cut(cut, scale_x, scale_y),
             mask=palm.piece.copy(),
+            way=self._find_hand.way,
             template=template,
             match=matched.match,
             distances=matched.distances,

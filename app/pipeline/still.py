@@ -1,26 +1,45 @@
 """Still: the hand in one photograph, for enrolment and for asking what a picture shows."""
 
+from typing import Any, NamedTuple
+
 import cv2
 import numpy as np
 import simplejpeg
+from numpy.typing import NDArray
 
 from app.config import PipelineSettings
 from app.errors import ImageRefused, TooLarge
+from app.pipeline.binarise import Binarise
+from app.pipeline.channel import Channel
 from app.pipeline.formats import ImageInfo, cut_short, read_info
 from app.pipeline.hand import FindHand, Stopwatch
-from app.pipeline.palm import SIDES, Palm
+from app.pipeline.mask import LearnedMask
+from app.pipeline.normalise import Normalise
+from app.pipeline.palm import Palm
 from app.pipeline.pipeline import scale_box, scale_cut, whole_or_cut
+from app.pipeline.quality import Finding, Quality, judge, why_cut_off
 from app.pipeline.roi import RegionOfInterest
+from app.pipeline.smooth import Smooth
 from app.pipeline.template import MakeTemplate
 from app.pipeline.types import U8, Extraction
 from app.pipeline.views import Views
 from app.pipeline.wrist import WristCrop
 
+BAND = 256
+"""Rows of a PNG or WebP that are brought to 8 bits without transparency at a time."""
 MIN_SIDE = 32
 """Pixels. A smaller photograph does not fill a template of 60x80 with anything of its own."""
-CUT_OFF = 1.6
-"""Palm radii. A hand that touches another side than the arm's on so much runs out of the picture;
-finger tips that just touch it do not."""
+
+SURE = 0.85
+"""Share of hand from which a pixel counts towards a second hand: a face or a lamp that the network
+half takes for one must not refuse a good photograph."""
+
+
+class Shot(NamedTuple):
+    """A photograph that is good enough to enrol."""
+
+    extraction: Extraction
+    quality: Quality
 
 
 def read_image(data: bytes, settings: PipelineSettings) -> tuple[U8, int, int]:
@@ -91,15 +110,24 @@ def _other(data: bytes) -> U8:
     pixels = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
     if pixels is None:
         raise cut_short()
-    if pixels.dtype == np.uint16:
-        pixels = pixels // np.uint16(256)
-    picture = pixels.astype(np.uint8).reshape(*pixels.shape[:2], -1)
-    if picture.shape[2] in (2, 4):
-        # What is transparent is shown on white by every viewer.
-        alpha = picture[:, :, -1:].astype(np.uint16)
-        mixed = picture[:, :, :-1] * alpha + 255 * (255 - alpha)
-        picture = (mixed // 255).astype(np.uint8)
-    return np.ascontiguousarray(picture)
+    pixels = pixels.reshape(*pixels.shape[:2], -1)
+    height, width, planes = pixels.shape
+    picture = np.empty((height, width, 1 if planes < 3 else 3), np.uint8)
+    # Band by band: copies of a picture of 25 million pixels would take half a gigabyte.
+    for top in range(0, height, BAND):
+        picture[top : top + BAND] = _opaque(pixels[top : top + BAND])
+    return picture
+
+
+def _opaque(band: NDArray[Any]) -> U8:
+    """8 bits a channel, and what is transparent on white, as every viewer shows it."""
+    if band.dtype == np.uint16:
+        band = band // np.uint16(256)
+    if band.shape[2] in (1, 3):
+        return band.astype(np.uint8)
+    alpha = band[:, :, -1:].astype(np.uint16)
+    mixed = band[:, :, :-1] * alpha + 255 * (255 - alpha)
+    return (mixed // 255).astype(np.uint8)
 
 
 def _upright(pixels: U8, orientation: int) -> U8:
@@ -126,18 +154,71 @@ def extract_template(data: bytes, settings: PipelineSettings, *, whole: bool = T
         TooLarge: too many bytes.
         ImageRefused: no picture, or no usable hand in it, with the reason in plain words.
     """
+    found = _find(data, settings)
+    if whole:
+        _refuse(why_cut_off(found.palm))
+    return _extract(found, settings)
+
+
+def take_shot(data: bytes, settings: PipelineSettings) -> Shot:
+    """Find the hand in a photograph that is to be enrolled, and judge the photograph.
+
+    Raises:
+        TooLarge: too many bytes.
+        ImageRefused: no picture, no hand in it, or one that should not be enrolled: cut off, too
+            small, blurred, without a wrist, or not alone. ``detail["problem"]`` is a word for it.
+    """
+    found = _find(data, settings)
+    quality = judge(found.pixels, _everything(found, settings), found.palm, settings.quality)
+    _refuse(quality.problem)
+    return Shot(_extract(found, settings), quality)
+
+
+class _Found(NamedTuple):
+    """The hand in a photograph, before the arm is cut off; ``width`` x ``height`` is the photo."""
+
+    pixels: U8
+    width: int
+    height: int
+    palm: Palm
+    mode: str
+
+
+def _find(data: bytes, settings: PipelineSettings) -> _Found:
     pixels, width, height = read_image(data, settings)
     find_hand = FindHand(settings)
     palm = find_hand(pixels, Stopwatch())
     reason = find_hand.why_none(palm)
-    if reason is None and whole:
-        reason = _why_cut_off(palm)
     if reason is not None:
-        raise ImageRefused(_as_refusal(reason))
+        _refuse(Finding("no_hand", reason.replace("no hand in the picture", "no hand found", 1)))
+    return _Found(pixels, width, height, palm, find_hand.way.mode)
+
+
+def _everything(found: _Found, settings: PipelineSettings) -> U8:
+    """(h, w) mask of all that looks like a hand, wherever in the picture it is."""
+    if found.mode == "learned":
+        # The hand's own mask may come from a look at its part of the picture alone.
+        height, width = found.palm.piece.shape
+        whole = (0, 0, width, height)
+        share = LearnedMask()._look(found.pixels, whole)
+        mask = cv2.resize(share, (width, height), interpolation=cv2.INTER_LINEAR) > SURE
+        return mask.view(np.uint8)
+    plane = Channel(settings.binarise.channel)(found.pixels)
+    normalised = Normalise(settings.normalise)(Smooth(settings.smooth)(plane))
+    return Binarise(settings.binarise)(normalised).mask
+
+
+def _refuse(problem: Finding | None) -> None:
+    if problem is not None:
+        raise ImageRefused(problem.message, problem=problem.code)
+
+
+def _extract(found: _Found, settings: PipelineSettings) -> Extraction:
+    palm, width, height = found.palm, found.width, found.height
     hand, cut = WristCrop(settings.wrist)(palm)
     box = RegionOfInterest(settings.roi)(hand)
     if box is None:
-        raise ImageRefused("no hand found: nothing is left above the wrist")
+        raise ImageRefused("no hand found: nothing is left above the wrist", problem="no_hand")
     scale_x, scale_y = width / palm.piece.shape[1], height / palm.piece.shape[0]
     roi = scale_box(box, scale_x, scale_y)
     assert roi is not None
@@ -150,15 +231,3 @@ def extract_template(data: bytes, settings: PipelineSettings, *, whole: bool = T
         width=width,
         height=height,
     )
-
-
-def _as_refusal(reason: str) -> str:
-    return reason.replace("no hand in the picture", "no hand found", 1)
-
-
-def _why_cut_off(palm: Palm) -> str | None:
-    edges = (palm.piece[-1], palm.piece[:, 0], palm.piece[0], palm.piece[:, -1])
-    for side, edge in zip(SIDES, edges, strict=True):
-        if side != palm.arm and cv2.countNonZero(edge) > CUT_OFF * palm.radius:
-            return f"the hand is cut off at the {side} of the picture: show all of it"
-    return None

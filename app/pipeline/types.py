@@ -17,6 +17,13 @@ Side = Literal["bottom", "left", "top", "right"]
 Phase = Literal["start", "hold", "end"]
 
 
+class Way(NamedTuple):
+    """How the mask is made, and why so: words that go on from "because"."""
+
+    mode: Literal["threshold", "learned"]
+    why: str
+
+
 class WristCut(NamedTuple):
     """A straight cut along the picture's axes, in pixels.
 
@@ -39,6 +46,7 @@ class Match:
         error: Reconstruction error, in the unit of the distance.
         accepted: False when the distance, the margin or the error says that it is unknown.
         reason: Why it is not accepted, in plain words.
+        strangeness: How unlike anything enrolled, in one number: up to 1 is accepted, more is not.
     """
 
     gesture: str
@@ -47,6 +55,7 @@ class Match:
     error: float
     accepted: bool
     reason: str | None = None
+    strangeness: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -69,6 +78,7 @@ class FrameResult:
         roi: The hand without the arm, in pixels of the frame as sent.
         wrist: Where the arm is cut off, in pixels of the frame as sent.
         mask: (h, w), hand with arm = 1, at the working resolution; its own copy.
+        way: How the mask was made, and why so.
         template: (80, 60), or None when the frame did not get that far.
         match: The nearest gesture, also when it was not accepted; None without a template.
         distances: Distance to every enrolled gesture.
@@ -84,6 +94,7 @@ class FrameResult:
     roi: Box | None
     wrist: WristCut | None
     mask: U8
+    way: Way
     template: U8 | None
     match: Match | None
     reason: str | None
@@ -108,6 +119,7 @@ class FrameResult:
             "motion": None if self.motion is None else round(self.motion, 5),
             "still": self.still,
             "roi": None if self.roi is None else list(self.roi),
+            "mask": {"mode": self.way.mode, "why": self.way.why},
             "match": match,
             "reason": self.reason,
             "timing_ms": {stage: round(ms, 3) for stage, ms in self.timing_ms.items()},

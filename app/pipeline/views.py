@@ -1,8 +1,7 @@
 """Views: one hand turned a little and cut at several wrists, so that both may differ a little.
 
-Every enrolled template and every query is varied in the same way, and the nearest pair of views
-counts. On the digit signs this raises the accuracy with 1, 5 and 20 enrolled photos a sign from
-0.54, 0.78 and 0.91 to about 0.72, 0.92 and 0.96 (benchmarks/recognition.py).
+Every enrolled template and every query is varied, and the nearest pair of views counts. What that
+gives is in docs/recognition.md.
 """
 
 import math
@@ -24,7 +23,7 @@ _CANVAS = math.ceil(SMALL * math.sqrt(2)) + 2
 
 
 class Views:
-    """A hand as (v, h, w) masks, one for each pair of a cut and a turn.
+    """A hand as (v, h, w) masks, one for each cut and turn; an enrolled one leans, too.
 
     Each view: cut ``c`` palm radii from the palm's centre towards the arm, turned about the box's
     centre by ``a``, boxed again, and stretched to ``w`` x ``h``. That is 30x40 for the ``distance``
@@ -34,8 +33,10 @@ class Views:
     def __init__(self, settings: MatchSettings) -> None:
         self._cuts = sorted(set(settings.cuts))
         self._trims = sorted(set(settings.trims), reverse=True)
-        self._turns = settings.turns
-        half = settings.features == "distance"
+        self._poses = [(turn, 0.0) for turn in settings.turns]
+        # A hand seen a little from the side, or with its fingers leaning; enrolled ones only.
+        self._enrolled = self._poses + [(0.0, shear) for shear in settings.shears]
+        half = settings.features != "binary"
         self.width, self.height = (WIDTH // 2, HEIGHT // 2) if half else (WIDTH, HEIGHT)
         self._canvas: U8 = np.zeros((_CANVAS, _CANVAS), np.uint8)
         self._find_palm = PalmFinder()
@@ -43,17 +44,20 @@ class Views:
     def of_template(self, template: U8) -> U8:
         """Views of an (80, 60) template, whose flattest side is taken for the wrist."""
         palm = self._find_palm(np.ascontiguousarray(template, np.uint8))
-        return self._vary(palm, [_trimmed(palm, radii) for radii in self._trims])
+        cuts = [_trimmed(palm, radii) for radii in self._trims]
+        return self._vary(palm, cuts, self._enrolled)
 
     def __call__(self, palm: Palm) -> U8:
         """Views of the hand in ``palm.piece``; at least one."""
-        return self._vary(palm, [cut_at(palm, radii) for radii in self._cuts])
+        return self._vary(palm, [cut_at(palm, radii) for radii in self._cuts], self._poses)
 
-    def _vary(self, palm: Palm, cuts: list[WristCut | None]) -> U8:
+    def _vary(
+        self, palm: Palm, cuts: list[WristCut | None], poses: list[tuple[float, float]]
+    ) -> U8:
         if not palm.found:
             return np.zeros((1, self.height, self.width), np.uint8)
         cuts = cuts or [None]
-        views = np.empty((len(cuts) * len(self._turns), self.height, self.width), np.uint8)
+        views = np.empty((len(cuts) * len(poses), self.height, self.width), np.uint8)
         count = 0
         seen: set[int | None] = set()
         # Shrinking comes first and once, with the longest piece of arm that any view keeps.
@@ -76,24 +80,22 @@ class Views:
                 erase_arm(small, cut._replace(at=at))
             if at not in seen:
                 seen.add(at)
-                for turn in self._turns:
-                    self._turned(small, turn, views[count])
+                for turn, shear in poses:
+                    self._posed(small, turn, shear, views[count])
                     count += 1
         return views[:count]
 
-    def _turned(self, small: U8, turn: float, out: U8) -> None:
-        if turn == 0:
+    def _posed(self, small: U8, turn: float, shear: float, out: U8) -> None:
+        if turn == 0 and shear == 0:
             turned = small
         else:
             height, width = small.shape
             cosine, sine = math.cos(turn), math.sin(turn)
             cx, cy, middle = (width - 1) / 2, (height - 1) / 2, (_CANVAS - 1) / 2
-            matrix = np.array(
-                [
-                    [cosine, -sine, middle - cosine * cx + sine * cy],
-                    [sine, cosine, middle - sine * cx - cosine * cy],
-                ]
-            )
+            # x' = R (x + shear y), about the middle
+            linear = np.array([[cosine, cosine * shear - sine], [sine, sine * shear + cosine]])
+            shift = middle - linear @ np.array([cx, cy])
+            matrix = np.column_stack([linear, shift])
             cv2.warpAffine(
                 small, matrix, (_CANVAS, _CANVAS), dst=self._canvas, flags=cv2.INTER_NEAREST
             )

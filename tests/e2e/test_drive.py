@@ -1,6 +1,7 @@
 """The main job: a hand shown to a webcam in a browser moves the arm in another process."""
 
 import os
+import re
 import signal
 import time
 from pathlib import Path
@@ -56,6 +57,10 @@ def test_a_hand_shown_to_the_webcam_moves_the_arm_and_the_page_shows_it(
     assert isinstance(cause, int), "the motion names the frame that caused it"
     wait_for(page, f"window.farhand.robot.tool.position[2] > {low + 0.05}")
     assert page.evaluate("window.farhand.robot.joints") != joints
+    # It says how the hand is told from the room, and why so.
+    expect(page.locator("#seen-mask")).to_have_text(
+        re.compile("^(learned mask|plain threshold), because the background "), timeout=SLOW
+    )
 
     # When the hand is gone the arm comes to rest by itself, still armed, and nothing is wrong.
     wait_for(page, "window.farhand.robot.mode === 'armed'")

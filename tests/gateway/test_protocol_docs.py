@@ -12,8 +12,11 @@ from app.gateway import messages
 from app.gateway.app import create_app
 from app.gateway.errors import _HTTP_CODES
 from app.gateway.messages import _CLIENT_MESSAGE
+from app.gateway.uploads import MAX_BURST, MAX_IMAGES
 from app.link import actions
 from app.pipeline import STAGES
+from app.pipeline.burst import KEPT, MAX_FRAMES
+from app.pipeline.confusion import LIKELY, POSSIBLE
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "protocol.md").read_text()
@@ -73,6 +76,16 @@ def test_every_stage_is_documented() -> None:
         assert f"`{stage}`" in TEXT, stage
 
 
+def test_every_word_for_what_is_wrong_with_an_image_is_documented() -> None:
+    codes = set()
+    for name in ("quality", "still", "burst", "confusion"):
+        source = (ROOT / "app" / "pipeline" / f"{name}.py").read_text()
+        codes |= set(re.findall(r'Finding\(\s*"([a-z_]+)"', source))
+        codes |= set(re.findall(r'_leave\(\w+, \w+, "([a-z_]+)"', source))
+    assert len(codes) >= 15
+    assert sorted(code for code in codes if f"`{code}`" not in TEXT) == []
+
+
 def test_the_page_knows_the_same_messages() -> None:
     script = (ROOT / "app" / "static" / "core" / "protocol.js").read_text()
     for name, expected in (
@@ -88,6 +101,9 @@ def test_the_limits_are_the_settings() -> None:
     settings = Settings()
     assert settings.gateway.max_message_bytes == 1 << 20
     assert settings.gateway.max_upload_bytes == 4 << 20
+    assert settings.gateway.max_burst_bytes == 16 << 20
+    assert (MAX_IMAGES, MAX_BURST, MAX_FRAMES, KEPT) == (50, 120, 120, 8)
+    assert (LIKELY, POSSIBLE) == (0.9, 0.7)
     assert settings.gateway.max_bad_messages == 10
     assert settings.gateway.max_sessions == 32
     assert settings.gateway.max_frame_age_ms == 500

@@ -136,6 +136,7 @@ def test_no_flipped_bytes_change_what_a_gesture_does(tmp_path: Path) -> None:
         'UPDATE gesture SET action = \'{"type":"gripper","width":0.1}\' WHERE number = 2',
         "UPDATE gesture SET action = 'nonsense' WHERE number = 2",
         "UPDATE gesture SET name = 'other' WHERE number = 2",
+        "UPDATE gesture SET active = 0 WHERE number = 2",
         "UPDATE sample SET template = zeroblob(600) WHERE number = 3",
         "UPDATE sample SET template = zeroblob(3) WHERE number = 3",
         "UPDATE gesture SET created_ms = 1e300 WHERE number = 2",
@@ -160,7 +161,7 @@ def test_a_newer_database_is_refused_by_its_version(tmp_path: Path) -> None:
     make(path)
     execute(path, "UPDATE alembic_version SET version_num = '0999'")
     message = broken(path)
-    assert "was written by a newer Farhand (its version 0999, this one knows 0001)" in message
+    assert "was written by a newer Farhand (its version 0999, this one knows 0002)" in message
 
 
 def test_tables_that_are_missing_are_noticed(tmp_path: Path) -> None:
@@ -290,6 +291,7 @@ def test_databases_of_every_version_so_far_are_brought_up_to_date(
     store = GestureStore(url(path), STARTER)
     greeting, wave = store.list()
     assert (greeting.name, wave.name) == ("Grüße", "wave")
+    assert greeting.active and wave.active
     assert greeting.action == JogCartesian(linear=(0.1, 0.0, 0.0))
     assert wave.action == Sequence(steps=(JogJoint(joint=1, velocity=0.1, duration=2.0), Stop()))
     assert store.templates() == [

@@ -7,6 +7,7 @@ import pytest
 
 from app.errors import Duplicate, Invalid, NotFound, StorageFull
 from app.gestures import GestureStore, NewGesture
+from app.gestures.exchange import export_set, import_set
 from app.gestures.records import MAX_SAMPLES
 from app.link.actions import Action, Gripper, Home, JogJoint, Sequence, Stop, TurnJoint
 from tests.gestures.conftest import template, url
@@ -219,3 +220,34 @@ def test_a_full_disk_changes_nothing(tmp_path: Path) -> None:
     assert store.list() == [made]
     assert store.version == 1
     store.close()
+
+
+def test_an_inactive_gesture_is_kept_and_listed_but_not_matched(store: GestureStore) -> None:
+    store.create("shown", Home(), [template(1)])
+    quiet = store.create("quiet", Home(), [template(2)], active=False)
+    assert [gesture.active for gesture in store.list()] == [True, False]
+    assert [name for name, _ in store.templates()] == ["shown"]
+    before = store.version
+    assert store.update(quiet.id, active=True).active
+    assert store.version > before
+    assert [name for name, _ in store.templates()] == ["shown", "quiet"]
+    # What is not named stays as it is.
+    assert store.update(quiet.id, active=False).active is False
+    assert store.update(quiet.id, name="still").active is False
+
+
+def test_inactive_gestures_stay_so_in_the_exchange_format(
+    store: GestureStore, tmp_path: Path
+) -> None:
+    store.create("shown", Home(), [template(1)])
+    store.create("quiet", Home(), [template(2)], active=False)
+    export_set(store, tmp_path / "set")
+    text = (tmp_path / "set" / "gestures.toml").read_text()
+    assert text.count("active") == text.count("active = false") == 1
+    other = GestureStore(url(tmp_path / "other.db"), None)
+    import_set(other, tmp_path / "set")
+    assert [(gesture.name, gesture.active) for gesture in other.list()] == [
+        ("shown", True),
+        ("quiet", False),
+    ]
+    other.close()

@@ -5,7 +5,7 @@ import pytest
 
 from app.errors import Invalid, NotFound
 from app.pipeline.evaluate import UNKNOWN, evaluate
-from tests.pipeline.drawing import PHOTOS, draw, encoded, jpeg
+from tests.pipeline.drawing import PHOTOS, SETTINGS, draw, encoded, jpeg
 
 MEASURED = ("ms_per_image",)
 
@@ -32,7 +32,7 @@ def others(tmp_path_factory):
 
 
 def test_drawn_hands_are_told_apart(tree):
-    result = evaluate(tree, shots=1, trials=3, seed=1)
+    result = evaluate(tree, settings=SETTINGS, shots=1, trials=3, seed=1)
     assert result["accuracy"] == {"mean": 1.0, "std": 0.0}
     assert result["labels"] == ["fist", "five", "one"]
     assert result["per_label"] == {"five": 1.0, "fist": 1.0, "one": 1.0}
@@ -44,17 +44,67 @@ def test_drawn_hands_are_told_apart(tree):
 
 def test_same_seed_gives_the_same_figures(tree):
     def run(seed):
-        result = evaluate(tree, shots=2, trials=2, seed=seed, reject=True)
+        result = evaluate(tree, settings=SETTINGS, shots=2, trials=2, seed=seed, reject=True)
         return {key: value for key, value in result.items() if key not in MEASURED}
 
     assert run(5) == run(5)
 
 
 def test_unknown_labels_are_accepted_without_rejection(tree, others):
-    result = evaluate(tree, trials=1, unknown=others)
+    result = evaluate(tree, settings=SETTINGS, trials=1, unknown=others)
     assert result["unknown_images"] == 1
     assert result["unknown_accepted"] == 1.0
-    assert evaluate(tree, trials=1, unknown=others, reject=True)["unknown_accepted"] in (0.0, 1.0)
+    assert evaluate(tree, settings=SETTINGS, trials=1, unknown=others, reject=True)[
+        "unknown_accepted"
+    ] in (0.0, 1.0)
+
+
+def test_labels_known_and_unknown_are_asked_once(tree, others):
+    result = evaluate(tree, settings=SETTINGS, trials=2, unknown=others)
+    assert (result["asked"], result["unknown_asked"]) == (2 * 3 * 3, 2)
+    assert (result["unknown_images"], result["holdout_labels"]) == (1, 0)
+
+
+def test_curve_only_with_something_unknown(tree, others):
+    keys = ("curve", "missed_at_5_percent_accepted", "accepted_at_90_percent_passed")
+    assert [evaluate(tree, settings=SETTINGS, trials=1)[key] for key in keys] == [None] * 3
+    result = evaluate(tree, settings=SETTINGS, trials=1, unknown=others, reject=True)
+    own = next(point for point in result["curve"] if point["threshold"] == 1.0)
+    assert own["known_passed"] == pytest.approx(1 - result["rejected"])
+    assert own["unknown_accepted"] == result["unknown_accepted"]
+    json.dumps(result, allow_nan=False)
+
+
+def test_labels_left_out_play_the_unknown(tree):
+    result = evaluate(tree, settings=SETTINGS, shots=2, trials=4, holdout_labels=1, reject=True)
+    assert (result["asked"], result["unknown_asked"]) == (4 * 2 * 2, 4 * 4)
+    assert result["curve"]
+    assert evaluate(tree, settings=SETTINGS, trials=1, holdout_labels=2)["accuracy"]["mean"] == 1.0
+    for number in (-1, 3):
+        message = f"^{number} of 3 labels cannot be left out: 0 to 2 are possible$"
+        with pytest.raises(Invalid, match=message):
+            evaluate(tree, settings=SETTINGS, holdout_labels=number)
+
+
+def test_groups_are_kept_apart(tree, others):
+    result = evaluate(tree, settings=SETTINGS, trials=3, group=r"^(\d)\.")
+    assert (result["groups"], result["asked"]) == (4, 3 * 3 * 2)
+    assert set(result["per_group"]) <= set("0123")
+    assert set(result["per_group"].values()) == {1.0}
+    with pytest.raises(Invalid, match=r"^4 groups: no half of them has 3 pictures of every label"):
+        evaluate(tree, settings=SETTINGS, shots=3, group=r"^\d")
+    with pytest.raises(Invalid, match=r"^group '\^\\\\d' finds nothing in the file name a\.png$"):
+        evaluate(tree, settings=SETTINGS, unknown=others, group=r"^\d")
+
+
+def test_unknown_of_a_group_enrolled_from_is_not_asked(tree, tmp_path):
+    (tmp_path / "two").mkdir()
+    for n in range(4):
+        (tmp_path / "two" / f"{n}.png").write_bytes(encoded(draw("two")))
+    assert (
+        evaluate(tree, settings=SETTINGS, trials=3, unknown=tmp_path, group=r"^\d")["unknown_asked"]
+        == 3 * 2
+    )
 
 
 def test_picture_without_a_hand_counts_as_wrong(tree, tmp_path):
@@ -64,7 +114,7 @@ def test_picture_without_a_hand_counts_as_wrong(tree, tmp_path):
             (tmp_path / shape / path.name).write_bytes(path.read_bytes())
     (tmp_path / "one" / "wall.png").write_bytes(encoded(np.full((100, 100, 3), 99, np.uint8)))
     (tmp_path / "one" / "broken.jpg").write_bytes(b"nothing")
-    result = evaluate(tmp_path, shots=2, trials=4)
+    result = evaluate(tmp_path, settings=SETTINGS, shots=2, trials=4)
     assert result["no_hand"] == 2
     assert result["per_label"]["one"] == 0.5
     assert result["confusion"]["one"] == {"one": 8, UNKNOWN: 8}
@@ -80,17 +130,17 @@ def test_picture_without_a_hand_counts_as_wrong(tree, tmp_path):
 )
 def test_too_few(tree, shots, trials, message):
     with pytest.raises(Invalid, match=message):
-        evaluate(tree, shots=shots, trials=trials)
+        evaluate(tree, settings=SETTINGS, shots=shots, trials=trials)
 
 
 def test_missing_and_empty_folders(tree, tmp_path):
     with pytest.raises(NotFound, match=r"^no folder "):
-        evaluate(tmp_path / "none")
+        evaluate(tmp_path / "none", settings=SETTINGS)
     (tmp_path / "label").mkdir()
     with pytest.raises(Invalid, match=r"^no pictures in "):
-        evaluate(tmp_path)
+        evaluate(tmp_path, settings=SETTINGS)
     with pytest.raises(Invalid, match=r"^every label in .* is enrolled: others are needed$"):
-        evaluate(tree, unknown=tree)
+        evaluate(tree, settings=SETTINGS, unknown=tree)
 
 
 def test_no_hand_anywhere(tmp_path):
@@ -98,7 +148,7 @@ def test_no_hand_anywhere(tmp_path):
     for n in range(3):
         (tmp_path / "a" / f"{n}.png").write_bytes(encoded(np.zeros((64, 64, 3), np.uint8)))
     with pytest.raises(Invalid, match=r"^no hand was found in any of the pictures$"):
-        evaluate(tmp_path)
+        evaluate(tmp_path, settings=SETTINGS)
 
 
 @pytest.fixture(scope="module")

@@ -100,9 +100,10 @@ def test_order_of_enrolment_does_not_matter():
 
 def test_more_samples_lie_nearer():
     far = PcaMatcher.fit(GALLERY, SETTINGS)(views("two", scale=0.6)).distances["two"]
-    extra = gallery(("two",), scale=0.6)
+    extra = [gallery(("two",), scale=scale) for scale in (0.58, 0.6, 0.62)]
     both = Gallery(
-        GALLERY.labels + extra.labels, np.concatenate([GALLERY.templates, extra.templates])
+        GALLERY.labels + sum((g.labels for g in extra), ()),
+        np.concatenate([GALLERY.templates, *(g.templates for g in extra)]),
     )
     assert PcaMatcher.fit(both, SETTINGS)(views("two", scale=0.6)).distances["two"] <= far + 1e-3
 
@@ -113,9 +114,10 @@ def test_wrong_shapes_are_refused():
 
 
 def test_views_vary_turn_and_cut():
-    made = views("five")
-    assert made.shape == (15, 40, 30)
-    assert len({view.tobytes() for view in made}) == 15
+    made = views("five", MatchSettings(turns=(-0.2, 0.0, 0.2), cuts=(1.0, 1.3, 1.7)))
+    assert made.shape == (9, 40, 30)
+    assert len({view.tobytes() for view in made}) == 9
+    assert len(views("five")) == len(SETTINGS.turns) * len(SETTINGS.cuts)
     assert views("five", PAPER).shape == (1, 80, 60)
 
 
@@ -129,7 +131,7 @@ def test_views_of_an_empty_template():
 def test_distance_features_are_signed_and_squashed():
     view = np.zeros((1, 40, 30), np.uint8)
     view[0, 10:30, 8:22] = 1
-    features = Features(SETTINGS)(view).reshape(40, 30)
+    features = Features(MatchSettings(features="distance"))(view).reshape(40, 30)
     assert features[20, 15] > 0.8
     assert features[0, 0] < -0.8
     assert np.all((features > 0) == (view[0] == 1))
@@ -139,3 +141,29 @@ def test_distance_features_are_signed_and_squashed():
 def test_binary_features_are_the_pixels():
     view = np.eye(80, 60, dtype=np.uint8)[None]
     assert np.array_equal(Features(PAPER)(view)[0], view.ravel() * 2.0 - 1)
+
+
+def test_strangeness_is_at_most_one_exactly_when_accepted():
+    matcher = PcaMatcher.fit(GALLERY, SETTINGS)
+    for shape in GALLERY.labels:
+        for scale in (0.5, 0.8, 1.2):
+            for side in ("bottom", "left"):
+                match = matcher(views(shape, scale=scale, side=side)).match
+                assert match is not None
+                assert (match.strangeness <= 1) == match.accepted
+    narrow = SETTINGS.model_copy(update={"max_distance": 0.0, "min_reach": 0.0})
+    match = PcaMatcher.fit(GALLERY, narrow)(views("one", scale=0.6)).match
+    assert match is not None
+    assert match.strangeness > 1
+    json.dumps(asdict(match), allow_nan=False)
+
+
+def test_shape_features_are_the_distance_ones_and_numbers_of_one_length():
+    views = np.zeros((2, 40, 30), np.uint8)
+    views[0, 10:30, 8:22] = 1
+    views[1, 5:38, 12:18] = 1
+    rows = Features(SETTINGS)(views)
+    outlines = Features(MatchSettings(features="distance"))(views)
+    assert np.array_equal(rows[:, :1200], outlines)
+    lengths = np.linalg.norm(rows[:, 1200:], axis=1)
+    assert np.allclose(lengths, SETTINGS.shape_weight * np.sqrt(1200), rtol=1e-3)

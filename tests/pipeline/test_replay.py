@@ -1,13 +1,11 @@
 import cv2
 import pytest
 
-from app.config import PipelineSettings
 from app.errors import Invalid, NotFound
 from app.pipeline import Pipeline
 from app.pipeline.replay import replay
-from tests.pipeline.drawing import draw, encoded, jpeg, matcher
+from tests.pipeline.drawing import SETTINGS, draw, encoded, jpeg, matcher
 
-SETTINGS = PipelineSettings()
 MATCHER = matcher()
 
 
@@ -21,27 +19,27 @@ def phases(messages):
 
 
 def test_folder_of_frames(tmp_path):
-    for n in range(6):
+    for n in range(9):
         (tmp_path / f"{n}.jpg").write_bytes(jpeg(draw("two")))
-    (tmp_path / "6.png").write_bytes(encoded(draw("two")))
-    (tmp_path / "7.jpg").write_bytes(b"broken")
+    (tmp_path / "9.png").write_bytes(encoded(draw("two")))
+    (tmp_path / "a.jpg").write_bytes(b"broken")
     (tmp_path / "readme.txt").write_text("no frame")
     messages = list(replay(tmp_path, pipeline()))
-    assert [m["seq"] for m in messages if m["type"] == "frame"] == list(range(7))
+    assert [m["seq"] for m in messages if m["type"] == "frame"] == list(range(10))
     assert phases(messages) == [("two", "start"), ("two", "hold"), ("two", "end")]
     error = next(m for m in messages if m["type"] == "error")
-    assert (error["code"], error["seq"]) == ("frame_not_jpeg", 7)
-    assert messages[-1] == {"type": "gesture", "gesture": "two", "phase": "end", "seq": 6}
+    assert (error["code"], error["seq"]) == ("frame_not_jpeg", 10)
+    assert messages[-1] == {"type": "gesture", "gesture": "two", "phase": "end", "seq": 9}
 
 
 def test_video(tmp_path):
     path = tmp_path / "clip.avi"
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 30, (640, 480))
-    for shape in ["two"] * 10 + ["five"] * 10:
+    for shape in ["two"] * 14 + ["five"] * 14:
         writer.write(draw(shape))
     writer.release()
     messages = list(replay(path, pipeline()))
-    assert sum(m["type"] == "frame" for m in messages) == 20
+    assert sum(m["type"] == "frame" for m in messages) == 28
     order = [phase for phase in phases(messages) if phase[1] != "hold"]
     assert order == [("two", "start"), ("two", "end"), ("five", "start"), ("five", "end")]
 

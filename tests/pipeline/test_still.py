@@ -9,13 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from app.config import PipelineSettings
 from app.errors import ImageRefused, TooLarge
 from app.pipeline import extract_template
 from app.pipeline.still import read_image
-from tests.pipeline.drawing import PHOTOS, draw, encoded, jpeg
+from tests.pipeline.drawing import PHOTOS, SETTINGS, draw, encoded, jpeg
 
-SETTINGS = PipelineSettings()
 PICTURE = draw("two", noise=0)
 RGB = Image.fromarray(PICTURE[:, :, ::-1])
 REFERENCE = extract_template(encoded(PICTURE), SETTINGS)

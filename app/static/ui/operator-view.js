@@ -125,17 +125,18 @@ function seenPanel(element) {
     });
     const fact = (name, label) => {
         const value = el("dd", { id: `seen-${name}`, text: "–" });
-        return [value, el("div", {}, el("dt", { text: label }), value)];
+        return [value, el("div", { data: { fact: name } }, el("dt", { text: label }), value)];
     };
     const [found, foundRow] = fact("match", words.found);
     const [motion, motionRow] = fact("motion", words.motion);
     const [rate, rateRow] = fact("rate", words.rate);
     const [answer, answerRow] = fact("answer", words.answer);
+    const [mask, maskRow] = fact("mask", words.mask);
     element.append(
         el("figure", {}, template, el("figcaption", { text: words.template })),
-        el("dl", { class: "facts" }, foundRow, motionRow, rateRow, answerRow),
+        el("dl", { class: "facts" }, foundRow, motionRow, rateRow, answerRow, maskRow),
     );
-    return { template, found, motion, rate, answer };
+    return { template, found, motion, rate, answer, mask };
 }
 
 /** Fills the operator's card; returns the <video> that sources play in. */
@@ -243,6 +244,8 @@ export function operatorView(element, store) {
                 ? `${match.gesture}, ${number(match.distance, 2)}`
                 : frame ? words.nothing : "–",
         );
+        const way = frame && frame.mask;
+        setText(panel.mask, way ? words.maskValue(words.maskWays[way.mode] || way.mode, way.why) : "–");
         const motion = frame && Number.isFinite(frame.motion) ? percent(frame.motion) : null;
         const motionWords = frame && frame.still ? words.motionStill : words.motionMoving;
         setText(panel.motion, motion && frame.motion !== null ? motionWords(motion) : "–");

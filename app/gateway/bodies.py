@@ -1,0 +1,84 @@
+"""What the routes of the gestures take, for OpenAPI: they read their bodies themselves."""
+
+from typing import Any
+
+_BURST = {"type": "boolean", "default": False, "description": "frames of a few seconds"}
+_IMAGES = {"type": "array", "items": {"type": "string", "format": "binary"}}
+ENROL_BODY: dict[str, Any] = {
+    "required": True,
+    "content": {
+        "multipart/form-data": {
+            "schema": {
+                "type": "object",
+                "required": ["name", "action", "images"],
+                "properties": {
+                    "name": {"type": "string"},
+                    "action": {"type": "string", "description": "an action as JSON"},
+                    "active": {"type": "boolean", "default": True},
+                    "burst": _BURST,
+                    "images": _IMAGES,
+                },
+            }
+        }
+    },
+}
+SAMPLES_BODY: dict[str, Any] = {
+    "required": True,
+    "content": {
+        "multipart/form-data": {
+            "schema": {
+                "type": "object",
+                "required": ["images"],
+                "properties": {"burst": _BURST, "images": _IMAGES},
+            }
+        }
+    },
+}
+CHECK_BODY: dict[str, Any] = {
+    "required": True,
+    "content": {
+        "multipart/form-data": {
+            "schema": {
+                "type": "object",
+                "required": ["images"],
+                "properties": {
+                    "name": {"type": "string"},
+                    "action": {"type": "string", "description": "an action as JSON"},
+                    "active": {"type": "boolean", "default": True},
+                    "gesture": {"type": "string", "description": "id, to check more samples of it"},
+                    "burst": _BURST,
+                    "images": _IMAGES,
+                },
+            }
+        }
+    },
+}
+IMAGE_BODY: dict[str, Any] = {
+    "required": True,
+    "content": {
+        "multipart/form-data": {
+            "schema": {
+                "type": "object",
+                "required": ["image"],
+                "properties": {"image": {"type": "string", "format": "binary"}},
+            }
+        },
+        "image/*": {"schema": {"type": "string", "format": "binary"}},
+    },
+}
+PATCH_BODY: dict[str, Any] = {
+    "required": True,
+    "content": {
+        "application/json": {
+            "schema": {
+                "type": "object",
+                "properties": {
+                    "name": {"type": "string"},
+                    "action": {"type": "object"},
+                    "active": {"type": "boolean"},
+                },
+                "additionalProperties": False,
+            }
+        }
+    },
+}

@@ -1,0 +1,1 @@
+"""Networks that the pipeline runs, as ONNX files."""

@@ -1,0 +1,53 @@
+"""What ``farhand doctor`` says when a part is missing. That all is well is held by test_cli.py."""
+
+from pathlib import Path
+
+import onnxruntime
+import pytest
+
+from app.config import Settings
+from app.doctor import CHECKS, check_networks, run_checks
+from app.pipeline import features, mask, network
+
+
+@pytest.fixture
+def networks_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in set(CHECKS) - {"networks"}:
+        monkeypatch.delitem(CHECKS, name)
+
+
+def test_both_networks_answer() -> None:
+    finding = check_networks(Settings())
+    assert "mask by network takes" in finding.text
+
+
+@pytest.mark.parametrize(("module", "name"), [(mask, "MODEL"), (features, "SHAPE_MODEL")])
+def test_a_network_that_is_missing_is_named(
+    networks_alone: None,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    module: object,
+    name: str,
+) -> None:
+    monkeypatch.setattr(module, name, "gone.onnx")
+    assert not run_checks(Settings())
+    assert "FAIL networks    the network gone.onnx cannot be read" in capsys.readouterr().out
+
+
+def test_a_network_that_is_broken_is_named(
+    networks_alone: None,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "broken.onnx").write_bytes(b"not a network")
+    monkeypatch.setattr(mask, "MODEL", str(tmp_path / "broken.onnx"))
+    assert not run_checks(Settings())
+    assert "FAIL networks    the network" in capsys.readouterr().out
+
+
+def test_a_network_is_read_once_and_runs_on_one_thread() -> None:
+    session = network.load(mask.MODEL)
+    assert network.load(mask.MODEL) is session
+    assert isinstance(session, onnxruntime.InferenceSession)
+    assert session.get_session_options().intra_op_num_threads == 1

@@ -1,0 +1,1 @@
+"""How the networks in ``app/pipeline/models`` are trained. See README.md beside this file."""
