@@ -15,8 +15,15 @@ MAX_LINEAR_SPEED = 1.0
 """m/s, per axis."""
 MAX_ANGULAR_SPEED = 3.15
 """rad/s, per axis."""
+MAX_JOINTS = 16
+"""Joints that a robot may have; what it really has, it says in its description."""
 MAX_STEPS = 32
-"""Steps of one sequence."""
+"""Steps written in one sequence."""
+MAX_DONE_STEPS = 256
+"""Steps of one sequence after its repeats are counted out."""
+MAX_REPEATS = 100
+MAX_OFFSET = 1.0
+"""m, per axis, of one straight move."""
 
 
 class _Action(BaseModel):
@@ -34,13 +41,15 @@ Duration = Annotated[
 ]
 LinearSpeed = Annotated[float, Field(ge=-MAX_LINEAR_SPEED, le=MAX_LINEAR_SPEED)]
 AngularSpeed = Annotated[float, Field(ge=-MAX_ANGULAR_SPEED, le=MAX_ANGULAR_SPEED)]
+Offset = Annotated[float, Field(ge=-MAX_OFFSET, le=MAX_OFFSET)]
+Turn = Annotated[float, Field(ge=-3.1, le=3.1)]
 
 
 class JogJoint(_Action):
     """Turn one joint at a constant speed while the gesture is held."""
 
     type: Literal["jog_joint"] = "jog_joint"
-    joint: int = Field(ge=1, le=6, description="1 is the joint at the base.")
+    joint: int = Field(ge=1, le=MAX_JOINTS, description="1 is the joint at the base.")
     velocity: float = Field(ge=-MAX_JOINT_SPEED, le=MAX_JOINT_SPEED, description="rad/s")
     duration: Duration = None
 
@@ -63,8 +72,27 @@ class TurnJoint(_Action):
     """Turn one joint by an exact angle. Ends there; letting go before stops it on the way."""
 
     type: Literal["turn_joint"] = "turn_joint"
-    joint: int = Field(ge=1, le=6, description="1 is the joint at the base.")
+    joint: int = Field(ge=1, le=MAX_JOINTS, description="1 is the joint at the base.")
     angle: float = Field(ge=-6.3, le=6.3, description="rad, relative to where the joint is")
+
+
+class MoveLinear(_Action):
+    """Move the tool by an exact way in a straight line, turning it evenly as it goes.
+
+    Ends there; letting go before stops it on the way.
+    """
+
+    type: Literal["move_linear"] = "move_linear"
+    frame: Literal["base", "tool"] = "base"
+    offset: tuple[Offset, Offset, Offset] = Field(
+        default=(0.0, 0.0, 0.0), description="m along x, y, z of the frame"
+    )
+    rotation: tuple[Turn, Turn, Turn] = Field(
+        default=(0.0, 0.0, 0.0), description="rotation vector in rad, in the frame"
+    )
+    speed: float | None = Field(
+        default=None, gt=0, le=MAX_LINEAR_SPEED, description="m/s; the robot's own unless given"
+    )
 
 
 class Pose(_Action):
@@ -79,6 +107,9 @@ class Gripper(_Action):
 
     type: Literal["gripper"] = "gripper"
     width: float = Field(ge=0.0, le=0.2, description="m between the fingers; 0 is closed")
+    force: float | None = Field(
+        default=None, gt=0, le=200, description="N of each finger; the robot's own unless given"
+    )
 
 
 class Home(_Action):
@@ -93,8 +124,29 @@ class Stop(_Action):
     type: Literal["stop"] = "stop"
 
 
+class Wait(_Action):
+    """Stand still for a while. Only inside a sequence."""
+
+    type: Literal["wait"] = "wait"
+    duration: float = Field(gt=0, le=60, description="s")
+
+
+_SimpleStep = Annotated[
+    JogJoint | JogCartesian | TurnJoint | MoveLinear | Pose | Gripper | Home | Wait | Stop,
+    Field(discriminator="type"),
+]
+
+
+class Repeat(_Action):
+    """Do some steps several times over. Only inside a sequence, and not in another repeat."""
+
+    type: Literal["repeat"] = "repeat"
+    times: int = Field(ge=1, le=MAX_REPEATS)
+    steps: tuple[_SimpleStep, ...] = Field(min_length=1, max_length=MAX_STEPS)
+
+
 Step = Annotated[
-    JogJoint | JogCartesian | TurnJoint | Pose | Gripper | Home | Stop,
+    JogJoint | JogCartesian | TurnJoint | MoveLinear | Pose | Gripper | Home | Wait | Repeat | Stop,
     Field(discriminator="type"),
 ]
 
@@ -107,14 +159,22 @@ class Sequence(_Action):
 
     @model_validator(mode="after")
     def _jogs_end(self) -> "Sequence":
+        done = 0
         for number, step in enumerate(self.steps, start=1):
-            if isinstance(step, JogJoint | JogCartesian) and step.duration is None:
-                raise ValueError(f"step {number} ({step.type}) needs a duration in seconds")
+            inner = step.steps if isinstance(step, Repeat) else (step,)
+            done += len(inner) * (step.times if isinstance(step, Repeat) else 1)
+            for each in inner:
+                if isinstance(each, JogJoint | JogCartesian) and each.duration is None:
+                    raise ValueError(f"step {number} ({each.type}) needs a duration in seconds")
+        if done > MAX_DONE_STEPS:
+            raise ValueError(
+                f"the sequence has {done} steps with its repeats; at most {MAX_DONE_STEPS} may be"
+            )
         return self
 
 
 Action = Annotated[
-    JogJoint | JogCartesian | TurnJoint | Pose | Gripper | Home | Stop | Sequence,
+    JogJoint | JogCartesian | TurnJoint | MoveLinear | Pose | Gripper | Home | Stop | Sequence,
     Field(discriminator="type"),
 ]
 ACTION: TypeAdapter[Action] = TypeAdapter(Action)

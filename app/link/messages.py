@@ -23,6 +23,8 @@ Mode = Literal["disarmed", "armed", "moving", "holding", "stopped", "faulted"]
 ``holding``: category S2, stands with power until no gesture has been shown for 0.5 s.
 ``stopped``: category S1 or S0, latched until a reset. ``faulted``: the node is in trouble."""
 StopCategory = Literal["S0", "S1", "S2"]
+Doubt = Literal["no_hand", "unknown_hand", "two_hands", "low_margin", "frozen", "stale_picture"]
+"""Why the gateway does not trust what the operator shows, or what the operator sees."""
 
 
 def key(robot: str, what: str) -> str:
@@ -66,6 +68,12 @@ class Command(Message):
     reason: str | None = Field(
         default=None, description="why there is no action, in plain words", max_length=300
     )
+    doubt: Doubt | None = Field(
+        default=None, description="hold still (S2) if anything moves; the words are in reason"
+    )
+    scale: float = Field(
+        default=1.0, ge=0.01, le=1.0, description="part of the ordinary speed that is wanted"
+    )
 
 
 class StopRequest(Message):
@@ -82,10 +90,11 @@ class LeaseRequest(Message):
     ``take``: become the one who drives (``takeover`` also when somebody else holds the lease; the
     arm then stops and must be armed again). ``renew``: still there (every 0.5 s; 2 s without frees
     the lease). ``release``. ``arm`` and ``disarm``: need the lease. ``reset``: leave the latched
-    stop; moves nothing and leaves the robot disarmed; needs no lease.
+    stop; moves nothing and leaves the robot disarmed; needs no lease. ``reset_scene``: put every
+    movable thing back where it was at first; needs the lease, and the arm to be disarmed.
     """
 
-    kind: Literal["take", "renew", "release", "arm", "disarm", "reset"]
+    kind: Literal["take", "renew", "release", "arm", "disarm", "reset", "reset_scene"]
     holder: str = Field(max_length=80, description="name of the session that asks")
     epoch: int | None = Field(default=None, ge=0, description="of the lease held")
     takeover: bool = False
@@ -106,6 +115,29 @@ class ObjectState(Message):
     name: str
     position: tuple[float, float, float] = Field(description="m")
     orientation: tuple[float, float, float, float] = Field(description="quaternion w, x, y, z")
+
+
+class Clearance(Message):
+    """How near the arm is to something, as commanded."""
+
+    distance: float = Field(description="m; negative when they overlap")
+    link: str = Field(description="URDF link of the arm")
+    thing: str = Field(description="name of the thing, or of the arm's other link")
+    itself: bool = Field(description="it is the arm itself")
+    points: tuple[tuple[float, float, float], tuple[float, float, float]] = Field(
+        description="m, base frame: the nearest points, on the link and on the thing"
+    )
+
+
+class Transition(Message):
+    """One step of the safety supervisor."""
+
+    number: int = Field(ge=1, description="rises by one")
+    tick: int = Field(description="ms on the node's monotonic clock")
+    before: str = Field(description="phase: disarmed, holding, armed, stopped")
+    after: str
+    stop: StopCategory | None = None
+    reason: str | None = None
 
 
 class LoopState(Message):
@@ -142,6 +174,16 @@ class State(Message):
     dropped: dict[str, int] = Field(default_factory=dict, description="commands refused, by reason")
     objects: tuple[ObjectState, ...] = ()
     loop: LoopState | None = None
+    scale: float = Field(default=1.0, description="part of the ordinary speed in force")
+    clearance: Clearance | None = Field(
+        default=None, description="nearest thing; None: nothing near, or not looked for"
+    )
+    transitions: tuple[Transition, ...] = Field(
+        default=(), description="the newest few steps of the safety supervisor, oldest first"
+    )
+    base: tuple[float, float, float] | None = Field(
+        default=None, description="of a mobile base: m, m, rad about Z, in the world"
+    )
 
 
 class JointDescription(Message):

@@ -202,6 +202,8 @@ class Controller:
                 if reply.granted:
                     self.fault = None
                 return reply
+            case "reset_scene":
+                return LeaseReply(granted=False, code="refused", reason="not possible yet")
 
     def _begin(self, command: Command) -> None:
         """A new showing of a gesture."""

@@ -7,7 +7,15 @@ import pytest
 from app.link import messages
 
 TEXT = (Path(__file__).parents[2] / "docs" / "protocol.md").read_text()
-PARTS = {"ObjectState", "LoopState", "JointDescription", "CameraDescription", "ObjectDescription"}
+PARTS = {
+    "ObjectState",
+    "LoopState",
+    "Clearance",
+    "Transition",
+    "JointDescription",
+    "CameraDescription",
+    "ObjectDescription",
+}
 """Not sent by themselves, only inside others."""
 
 

@@ -89,6 +89,19 @@ class ObjectModel(_Part):
     grid: bool = Field(default=False, description="pictures show a 10 cm grid on its top")
 
 
+class WorkspaceModel(_Part):
+    """The box that the tool may not leave, base frame."""
+
+    lower: Vector3 = Field(description="m")
+    upper: Vector3 = Field(description="m")
+
+    @model_validator(mode="after")
+    def _has_room(self) -> Self:
+        if any(low >= high for low, high in zip(self.lower, self.upper, strict=True)):
+            raise ValueError(f"lower {self.lower} is not below upper {self.upper}")
+        return self
+
+
 class Model(_Part):
     """Everything about a robot that its URDF does not say."""
 
@@ -102,6 +115,12 @@ class Model(_Part):
     poses: dict[str, tuple[float, ...]] = Field(description="rad")
     cameras: tuple[CameraModel, ...]
     objects: tuple[ObjectModel, ...]
+    workspace: WorkspaceModel | None = Field(default=None, description="none: not bounded")
+    never_touch: tuple[tuple[str, str], ...] = Field(
+        default=(),
+        description="pairs of links whose distance means nothing, because they cannot meet or are "
+        "joined; neighbours in the chain are always left out",
+    )
 
     @model_validator(mode="after")
     def _poses_fit(self) -> Self:

@@ -11,10 +11,14 @@ from app.link.actions import (
     Home,
     JogCartesian,
     JogJoint,
+    MoveLinear,
     Pose,
+    Repeat,
     Sequence,
+    Step,
     Stop,
     TurnJoint,
+    Wait,
 )
 from app.robot.arm import Arm, Reading, Vector
 from app.robot.motion import sequence
@@ -74,8 +78,10 @@ class Motion:
         """Limits at work, in plain words."""
         return self._task.limits if self._task is not None else ()
 
-    def refusal(self, action: Action) -> str | None:
+    def refusal(self, action: Action | Step) -> str | None:
         """Why this arm cannot do ``action``, in plain words; None when it can."""
+        if isinstance(action, MoveLinear | Wait | Repeat):
+            return f"this arm cannot do {action.type} yet"
         if isinstance(action, Sequence):
             for number, step in enumerate(action.steps, start=1):
                 if (reason := self.refusal(step)) is not None:
@@ -142,7 +148,7 @@ class Motion:
         if gripping and self._width is not None and abs(self._finger_speed) > _FINGERS_STILL:
             self._arm.grip(self._width)
 
-    def _task_of(self, action: Action) -> Task:
+    def _task_of(self, action: Action | Step) -> Task:
         match action:
             case JogJoint():
                 return JointJog(action, self._joints, self._settings.speed)
@@ -165,9 +171,11 @@ class Motion:
                 return sequence.Sequence([self._maker(step) for step in action.steps])
             case Stop():
                 return AskForStop(self._ask_for_stop)
+            case MoveLinear() | Wait() | Repeat():
+                raise ValueError(f"this arm cannot do {action.type} yet")
 
     def _ask_for_stop(self) -> None:
         self.wants_stop = True
 
-    def _maker(self, step: Action) -> Callable[[], Task]:
+    def _maker(self, step: Step) -> Callable[[], Task]:
         return lambda: self._task_of(step)
