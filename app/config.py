@@ -83,6 +83,11 @@ class BinariseSettings(_Section):
         description="learned mode: mean share of hand over the mask; with less there is no hand. "
         "Nine in ten true hands in rooms have 0.8 or more, most mistaken ones less than this",
     )
+    fill_holes: Fraction = Field(
+        default=0.015,
+        description="threshold: holes smaller than this part of the hand are filled; 0 leaves them "
+        "(paper)",
+    )
     min_area: Fraction = Field(default=0.005, description="smallest hand, part of the picture")
     max_area: Fraction = Field(default=0.8, description="largest hand, part of the picture")
 
