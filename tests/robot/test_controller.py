@@ -1,3 +1,5 @@
+from typing import get_args
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
@@ -6,8 +8,8 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from app.config import ArmMotionSettings
 from app.link.actions import Action, Gripper, Home, JogCartesian, JogJoint, Pose, Stop, TurnJoint
-from app.link.messages import Command, LeaseReply, LeaseRequest, State, StopRequest
-from app.robot.controller import DT, Controller, tick_of
+from app.link.messages import Command, Doubt, LeaseReply, LeaseRequest, State, StopRequest
+from app.robot.controller import DOUBTS, DT, Controller, tick_of
 from app.robot.latch import StopLatch
 from tests.robot.fakes import FakeArm
 
@@ -376,6 +378,151 @@ def test_the_gripper_moves_while_held() -> None:
     operator.show(Gripper(width=0.0), 1, 0.2)
     operator.show(None, 1, 0.5)
     assert 0.03 < operator.arm.width < 0.06
+
+
+def doubted(operator: Operator, doubt: str, seconds: float = 0.1, **more: object) -> None:
+    """Commands that doubt what the operator shows or sees, 30 a second."""
+    for count in range(round(seconds / DT)):
+        operator.now += DT
+        commands = [operator.command(None, 1, doubt=doubt, **more)] if count % 8 == 0 else []
+        operator.controller.cycle(operator.now, commands)
+
+
+@pytest.mark.parametrize("doubt", ["no_hand", "unknown_hand", "two_hands", "low_margin"])
+def test_a_hand_that_is_not_sure_any_more_holds_the_arm_still(doubt: str) -> None:
+    operator = Operator().ready()
+    operator.show(JOG, 1, 0.4)
+    doubted(operator, doubt)
+    state = operator.state
+    assert (state.mode, state.stop, state.doubt, state.armed) == ("holding", "S2", doubt, True)
+    assert state.reason == DOUBTS[doubt]
+    assert operator.standstill_after() <= 0.2
+    # Only a new gesture after half a second of none goes on.
+    operator.show(JOG, 2, 0.3)
+    assert operator.state.mode == "holding"
+    operator.show(None, 2, 0.6)
+    assert (operator.state.mode, operator.state.doubt) == ("armed", None)
+    operator.show(JOG, 3, 0.3)
+    assert operator.state.mode == "moving"
+
+
+@pytest.mark.parametrize("doubt", ["frozen", "stale_picture"])
+def test_eyes_that_see_nothing_new_hold_the_arm_still_although_the_gesture_is_held(
+    doubt: str,
+) -> None:
+    operator = Operator().ready()
+    operator.show(JOG, 1, 0.4)
+    # Half a second without an action, but not without a gesture.
+    doubted(operator, doubt, 1.0, gesture="jog_joint", reason="x")
+    state = operator.state
+    assert (state.mode, state.stop, state.doubt) == ("holding", "S2", doubt)
+    assert not operator.arm.velocities.any()
+    operator.show(JOG, 1, 0.3)
+    assert not operator.arm.velocities.any()
+
+
+def test_every_doubt_has_words_of_its_own() -> None:
+    assert set(DOUBTS) == set(get_args(Doubt))
+    assert len(set(DOUBTS.values())) == len(DOUBTS)
+
+
+def test_a_doubt_without_an_action_under_way_stops_nothing() -> None:
+    operator = Operator().ready()
+    doubted(operator, "no_hand", 0.3)
+    assert operator.state.mode == "armed"
+    turn = TurnJoint(joint=1, angle=0.1)
+    operator.show(turn, 1, 2.0)  # ends by itself
+    doubted(operator, "unknown_hand", 0.3)
+    assert operator.state.mode == "armed"
+    operator.show(JOG, 2, 0.4)
+    operator.show(None, 2, 0.02)  # let go: a hand that goes on to the next gesture
+    doubted(operator, "unknown_hand", 0.1)
+    assert operator.state.mode in ("moving", "armed")
+    operator.show(JogJoint(joint=2, velocity=0.3), 3, 0.5)
+    assert operator.state.mode == "moving"
+
+
+def test_another_stop_is_not_told_as_the_doubt_before_it() -> None:
+    operator = Operator().ready()
+    operator.show(JOG, 1, 0.4)
+    doubted(operator, "no_hand", 0.1)
+    operator.controller.stop(StopRequest(category="S2", source="page", reason="wait"))
+    assert (operator.state.doubt, operator.state.reason) == (None, "wait (page)")
+
+
+def test_the_speed_follows_the_scale_smoothly() -> None:
+    operator = Operator().ready()
+    velocities, wanted = [], JogJoint(joint=1, velocity=1.0)
+    for scale, expected in [(0.2, 0.2), (1.0, 1.0), (0.05, 0.05), (0.5, 0.5)]:
+        for count in range(round(0.8 / DT)):
+            operator.now += DT
+            commands = [operator.command(wanted, 1, scale=scale)] if count % 8 == 0 else []
+            operator.controller.cycle(operator.now, commands)
+            velocities.append(float(operator.arm.velocities[0]))
+        assert operator.state.scale == scale
+        assert velocities[-1] == pytest.approx(expected, abs=1e-6)
+    limits = operator.controller.motion.trajectory.limits.ordinary
+    acceleration = np.diff(velocities) / DT
+    assert np.abs(acceleration).max() <= limits.acceleration[0] * 1.001
+    assert np.abs(np.diff(acceleration) / DT).max() <= limits.jerk[0] * 1.001
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        TurnJoint(joint=1, angle=1.5),
+        Pose(name="tray"),
+        JogCartesian(linear=(0.0, 0.0, 0.2)),
+        JogCartesian(angular=(0.0, 0.0, 0.5), frame="tool"),
+    ],
+    ids=lambda action: action.type,
+)
+def test_a_change_of_the_scale_in_any_motion_keeps_the_limits(action: Action) -> None:
+    operator = Operator().ready()
+    limits = operator.controller.motion.trajectory.limits
+    tops, velocities = [], []
+    for scale, seconds in [(1.0, 0.3), (0.1, 0.3), (0.1, 0.2), (0.5, 0.2)]:
+        part = []
+        for count in range(round(seconds / DT)):
+            operator.now += DT
+            commands = [operator.command(action, 1, scale=scale)] if count % 8 == 0 else []
+            operator.controller.cycle(operator.now, commands)
+            part.append(operator.controller.motion.trajectory.velocity.copy())
+        tops.append(float((np.abs(part) / limits.ordinary.velocity).max()))
+        velocities += part
+    assert tops[2] <= 0.1 + 1e-6
+    assert min(tops[0], tops[3]) > 1.5 * tops[2]
+    acceleration = np.diff(velocities, axis=0) / DT
+    assert (np.abs(acceleration) <= limits.ordinary.acceleration * 1.01).all()
+    assert (np.abs(np.diff(acceleration, axis=0) / DT) <= limits.stop.jerk * 1.01).all()
+
+
+def test_the_states_tell_the_newest_steps() -> None:
+    operator = Operator().ready()
+    operator.show(JOG, 1, 0.4)
+    doubted(operator, "two_hands")
+    steps = operator.state.transitions
+    assert [step.number for step in steps] == list(range(1, len(steps) + 1))
+    assert (steps[-1].before, steps[-1].after, steps[-1].stop) == ("armed", "holding", "S2")
+    assert steps[-1].reason == DOUBTS["two_hands"]
+    assert 0 <= tick_of(operator.now) - steps[-1].tick <= 110
+    assert State.model_validate_json(operator.state.encode()).transitions == steps
+
+
+def test_things_go_back_only_while_the_arm_is_disarmed_or_stopped_and_stands() -> None:
+    operator = Operator().ready()
+    assert operator.ask("reset_scene", holder="anybody").code == "armed"
+    operator.show(JOG, 1, 0.4)
+    operator.ask("disarm")
+    assert operator.ask("reset_scene").code == "moving"
+    operator.wait(0.4)
+    assert operator.arm.scene_resets == 0
+    assert operator.ask("reset_scene", holder="anybody").granted
+    operator.controller.stop(StopRequest(source="page", reason="button"))
+    operator.wait(0.1)
+    assert operator.ask("reset_scene").granted
+    assert operator.arm.scene_resets == 2
+    assert operator.state.mode == "stopped"
 
 
 class AnyOrder(RuleBasedStateMachine):
