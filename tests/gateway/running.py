@@ -178,6 +178,15 @@ def running(settings: Settings) -> Iterator[Running]:
             raise failed[0]
 
 
+NEAR = Clearance(
+    distance=0.05,
+    link="link3",
+    thing="table",
+    itself=False,
+    points=((0.5, 0.0, 0.3), (0.5, 0.0, 0.25)),
+)
+
+
 class StandIn:
     """Speaks for a robot node in this process: the same link, the same answers, no arm.
 
@@ -278,13 +287,7 @@ class StandIn:
             tool_position=(0.5, 0.0, 0.3),
             tool_orientation=(1.0, 0.0, 0.0, 0.0),
             frame=self.frame,
-            clearance=Clearance(
-                distance=0.05,
-                link="link3",
-                thing="table",
-                itself=False,
-                points=((0.5, 0.0, 0.3), (0.5, 0.0, 0.25)),
-            ),
+            clearance=NEAR,
             transitions=(Transition(number=1, tick=5, before="disarmed", after="armed"),),
             dropped={"epoch": 3},
         )
