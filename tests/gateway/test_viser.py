@@ -95,7 +95,7 @@ def test_the_ghost_shows_only_where_the_arm_is_not_where_it_should_be(
     assert not scene.aids.ghost_shown
     assert scene.aids.told == "50 mm to table"
     # Nobody looks, so that only this test updates the scene from now on.
-    actual = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.02, 0.02])
+    actual = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.02])
     scene.aids.update(actual, actual + 0.01, NEAR)
     assert not scene.aids.ghost_shown
     scene.aids.update(actual, actual + 0.1, None)
