@@ -410,6 +410,20 @@ class GatewaySettings(_Section):
         le=10_000,
         description="a frame whose sender had seen no newer server tick than this moves nothing",
     )
+    frozen_ms: int = Field(
+        default=500,
+        ge=0,
+        le=10_000,
+        description="a live webcam whose pixels stay the same for this long is frozen: the arm "
+        "holds still; 0 never is",
+    )
+    picture_age_ms: int = Field(
+        default=1000,
+        ge=0,
+        le=60_000,
+        description="who drives by a picture of the robot older than this, and says so, cannot see "
+        "it: the arm holds still; 0 never",
+    )
     workers: int = Field(default=4, ge=1, le=64, description="threads for image work")
     robot_rate_hz: float = Field(
         default=20.0, ge=10.0, le=60.0, description="robot messages a second to every session"

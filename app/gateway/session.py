@@ -11,12 +11,15 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from app.errors import FarhandError, FrameRefused, RequestError
 from app.gateway.drive import Situation
 from app.gateway.errors import INTERNAL_MESSAGE
+from app.gateway.eyes import PictureAge
 from app.gateway.frame_age import FrameAge
 from app.gateway.frame_job import FrameDone, FrameJob, FrameWorker
 from app.gateway.lease_keeper import LeaseKeeper
 from app.gateway.messages import (
     ClientMessage,
+    Picture,
     Ping,
+    Speed,
     TakeControl,
     View,
     error_message,
@@ -87,6 +90,8 @@ class OperatorSession:
         self._bad_in_a_row = 0
         self._opened_tick = tick_ms()
         self._age = FrameAge(hub.settings.gateway.max_frame_age_ms)
+        self._pictures = PictureAge(hub.settings.gateway.picture_age_ms)
+        self._scale = 1.0
         self._detail = False
         self._next_detail = 0.0
 
@@ -205,6 +210,7 @@ class OperatorSession:
         if detail:
             self._next_detail = now + 1 / self._settings.gateway.detail_rate_hz
         enrolled = self._hub.gallery.current
+        state = self._hub.robot.live_state
         self._slot = FrameJob(
             seq=seq,
             jpeg=jpeg,
@@ -213,8 +219,10 @@ class OperatorSession:
             situation=Situation(
                 actions=enrolled.actions,
                 lease=self._leases.lease,
-                state=self._hub.robot.live_state,
+                state=state,
                 stale=self._age(header.tick, header.captured_ms, tick_ms()),
+                unseen=None if state is None else self._pictures(state.tick),
+                scale=self._scale,
                 at=now,
             ),
             enrolled=enrolled,
@@ -248,6 +256,10 @@ class OperatorSession:
                 self.outbox.put({"type": "pong", "t": message.t, "tick": tick_ms()})
             case View():
                 self._detail = message.detail
+            case Speed():
+                self._scale = message.scale
+            case Picture():
+                self._pictures.saw(message.camera, message.tick)
             case TakeControl():
                 self._queue(message)
             case _ if message.type == "stop":

@@ -91,7 +91,8 @@ class LeaseRequest(Message):
     arm then stops and must be armed again). ``renew``: still there (every 0.5 s; 2 s without frees
     the lease). ``release``. ``arm`` and ``disarm``: need the lease. ``reset``: leave the latched
     stop; moves nothing and leaves the robot disarmed; needs no lease. ``reset_scene``: put every
-    movable thing back where it was at first; needs the lease, and the arm to be disarmed.
+    movable thing back where it was at first; needs no lease, but an arm that is disarmed or
+    stopped, and stands.
     """
 
     kind: Literal["take", "renew", "release", "arm", "disarm", "reset", "reset_scene"]
@@ -160,6 +161,7 @@ class State(Message):
     epoch: int
     stop: StopCategory | None = Field(default=None, description="category in force")
     reason: str | None = Field(default=None, description="why it stands, in plain words")
+    doubt: Doubt | None = Field(default=None, description="why it holds, when doubt is the reason")
     fault: str | None = None
     stops: int = Field(default=0, description="stop requests received; confirms a StopRequest")
     joints: tuple[float, ...] = Field(description="rad, measured")

@@ -30,6 +30,8 @@ SAME_MEAN, SAME_MOST = 0.8, 6.0
 stays below when averaged, a finger tip that moves does not."""
 MOST_SKIPPED = 5
 """Frames in a row that the last mask may stand for; a mistake never lasts."""
+ROUND = 12
+"""Pictures after which the whole of one is looked at again, for what is beside the hand."""
 _THUMB = (40, 30)
 
 
@@ -65,17 +67,23 @@ class LearnedMask:
         self._thumb: U8 = np.empty(0, np.uint8)
         self._masked: Masked | None = None
         self._skipped = 0
+        self._since_whole = 0
+        self.everything: F32 | None = None
+        """Share of hand of the whole picture, when all of it was looked at for the last one."""
         self.looks = 0
         """Looks that the last picture took: 0 when the one before stood for it."""
 
     def __call__(self, pixels: U8) -> Masked:
         """Find the hand in a picture, the next of a stream or the only one."""
         self.looks = 0
+        self.everything = None
         thumb = np.asarray(cv2.resize(pixels, _THUMB, interpolation=cv2.INTER_AREA), np.uint8)
         if self._masked is not None and self._same(thumb, pixels):
             self._skipped += 1
+            self._since_whole += 1
             return self._masked
         self._skipped, self._thumb = 0, thumb
+        self._since_whole += 1
         if self._mask.shape != pixels.shape[:2]:
             self._mask = np.empty(pixels.shape[:2], np.uint8)
             self._part = None
@@ -91,9 +99,15 @@ class LearnedMask:
             closer = self._look(pixels, part)
             if (seen := _palm(closer, part)) is not None:
                 bounds, share, hand = part, closer, seen
+        if self.everything is None and self._since_whole >= ROUND:
+            self._look(pixels, whole)
         self._part = _part_round(hand, whole) if hand else None
         self._masked = self._spread(share, bounds)
         return self._masked
+
+    def look_round(self) -> None:
+        """Look at the whole of the next picture."""
+        self._since_whole = ROUND
 
     def _same(self, thumb: U8, pixels: U8) -> bool:
         if self._skipped >= MOST_SKIPPED or self._mask.shape != pixels.shape[:2]:
@@ -118,6 +132,8 @@ class LearnedMask:
         if seen.ndim == 2:
             seen = cv2.cvtColor(seen, cv2.COLOR_GRAY2BGR)
         share: F32 = self._session.run(None, {"input": seen})[0]
+        if part == (0, 0, pixels.shape[1], pixels.shape[0]):
+            self.everything, self._since_whole = share, 0
         return share
 
     def _spread(self, share: F32, bounds: Box) -> Masked:

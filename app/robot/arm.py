@@ -81,6 +81,10 @@ class Arm(Protocol):
         """Engaged: motors off and brakes on, nothing drops. Released: the motors hold."""
         ...
 
+    def reset_scene(self) -> None:
+        """Put every thing that can move back where it was at first. Only while the arm stands."""
+        ...
+
     def step(self) -> None:
         """Let 1/240 s pass, where time is simulated."""
         ...

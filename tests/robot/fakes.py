@@ -28,6 +28,7 @@ class FakeArm:
         """The arm does not follow."""
         self.braked = False
         self.closed = False
+        self.scene_resets = 0
         self.moves: list[tuple[Vector, Vector]] = []
 
     def read(self) -> Reading:
@@ -51,6 +52,9 @@ class FakeArm:
         self.braked = engaged
         if engaged:
             self.velocities = np.zeros(6)
+
+    def reset_scene(self) -> None:
+        self.scene_resets += 1
 
     def step(self) -> None:
         least = 0.0 if self.blocked_at is None else self.blocked_at

@@ -37,6 +37,9 @@ class JointTrajectory:
     def __init__(self, limits: Limits, joints: Vector, dt: float) -> None:
         self.limits = limits
         self.dt = dt
+        self.scale = 1.0
+        """Part of the ordinary speed at which motion runs. May change at any time: the velocity
+        goes over to the new one within the ordinary acceleration and jerk."""
         count = len(joints)
         self.position: Vector = np.zeros(count)
         self.velocity: Vector = np.zeros(count)
@@ -73,7 +76,7 @@ class JointTrajectory:
     def follow_velocity(self, wanted: Vector) -> None:
         """One step towards the joint velocities ``wanted`` (rad/s, shape (n,)), each on its own.
 
-        Velocities above the ordinary pace are clipped; a joint near its limit brakes.
+        Velocities above the ordinary pace are clipped, then scaled; a joint near its limit brakes.
 
         Raises:
             ValueError: ``wanted`` is not finite.
@@ -81,7 +84,7 @@ class JointTrajectory:
         if not np.isfinite(wanted).all():
             raise ValueError(f"joint velocities must be finite, not {wanted}")
         pace = self.limits.ordinary
-        wanted = np.clip(wanted, -pace.velocity, pace.velocity)
+        wanted = self.scale * np.clip(wanted, -pace.velocity, pace.velocity)
         # Once a joint brakes for its limit it does so to the end, lest it should dither there.
         self._held_back[np.sign(wanted) != self._held_back] = 0.0
         wanted = np.where(self._held_back != 0.0, 0.0, wanted)
@@ -121,7 +124,7 @@ class JointTrajectory:
         given = self._state_input(pace)
         given.control_interface = ControlInterface.Position
         given.synchronization = Synchronization.Time
-        given.max_velocity = pace.velocity.tolist()
+        given.max_velocity = (self.scale * pace.velocity).tolist()
         given.target_position = target.tolist()
         given.target_velocity = [0.0] * len(target)
         _checked(self._ruckig.calculate(given, self._profile))

@@ -13,6 +13,7 @@ from app.robot.sim.world import (
     add_object,
     connect,
     load_robot,
+    upright,
 )
 
 _POSITION_GAIN = 0.3
@@ -155,6 +156,20 @@ class SimulatedArm:
         else:
             self._braked = False
             self.move(self._angles()[0], np.zeros(len(self._joints)))
+
+    def reset_scene(self) -> None:
+        """Put every thing that can move back where it was at first, at rest."""
+        places = {thing.name: thing for thing in self.model.objects}
+        for name, body in self._moving:
+            pybullet.resetBasePositionAndOrientation(
+                body,
+                places[name].position,
+                upright(places[name].turn),
+                physicsClientId=self.client,
+            )
+            pybullet.resetBaseVelocity(
+                body, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), physicsClientId=self.client
+            )
 
     def step(self) -> None:
         """Let 1/240 s pass."""
