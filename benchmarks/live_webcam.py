@@ -21,12 +21,13 @@ import numpy as np
 
 from app.gestures.hand.poses import RELAXED
 from benchmarks.streams.hands import Drawn
-from benchmarks.streams.scene import HEIGHT, U8, WIDTH, Cutout, Studio, ease, plain_room, tremor
+from benchmarks.streams.scene import HEIGHT, U8, WIDTH, Cutout, Studio, plain_room, tremor
 
 FPS = 30
-RAISE_S = 0.5
-"""A hand comes into view in a gesture, or goes out of it; unhurried movements of the lower arm over
-such a way take 0.4 to 0.8 s."""
+RAISE_S = 0.6
+"""A hand is raised from the desk, or lowered to it."""
+_DESK = 1.5 * HEIGHT
+"""Pixels; so far below its place the hand rests, out of view."""
 _FORMING = 5
 """The sign is formed in so many steps, in the first half of the way up."""
 _SHAKE_S = 20
@@ -124,7 +125,6 @@ class LiveWebcam:
     def _frames(self) -> Iterator[U8]:
         """Pictures without end."""
         shoot = self._studio.shoot
-        travel = ease(self._studio.count(RAISE_S))
         while True:
             name = self._wanted
             if name is None:
@@ -132,9 +132,9 @@ class LiveWebcam:
                 continue
             self._tell(gone=False)
             way = self._way(name)
-            for share in travel:
+            for share in _travel():
                 hand = way[min(int(2 * share * _FORMING), _FORMING - 1)]
-                yield shoot((hand, (0.0, HEIGHT * (1 - share))))
+                yield shoot((hand, (0.0, _DESK * (1 - share))))
             for number in count():
                 yield shoot((way[-1], self._shakes[number % len(self._shakes)]))
                 if number == 0:
@@ -142,8 +142,8 @@ class LiveWebcam:
                 if self._wanted != name:
                     break
             self._tell()
-            for share in travel:
-                yield shoot((way[-1], (0.0, HEIGHT * share)))
+            for share in _travel():
+                yield shoot((way[-1], (0.0, _DESK * share)))
             yield shoot()
             self._tell(gone=True)
 
@@ -163,6 +163,13 @@ class LiveWebcam:
                 due += late
             if self._over.wait(max(0.0, -late)):
                 return
+
+
+def _travel() -> Iterator[float]:
+    """Shares of a way, with minimum jerk (Flash and Hogan 1985), by the clock."""
+    began = time.monotonic()
+    while (t := (time.monotonic() - began) / RAISE_S) < 1:
+        yield 10 * t**3 - 15 * t**4 + 6 * t**5
 
 
 def _planes(picture: U8) -> bytes:

@@ -1,0 +1,230 @@
+"""Somebody who drives a robot by gestures: looks, raises a hand, lowers it in time, looks again.
+
+The eyes are the robot's published state over REST, as late as a person's; the hands are a
+:class:`~benchmarks.live_webcam.LiveWebcam`. Nothing else reaches the robot.
+"""
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from types import TracebackType
+from typing import Any, Self
+
+import httpx
+import numpy as np
+from numpy.typing import NDArray
+
+from app.link.messages import State
+from benchmarks.live_webcam import LiveWebcam
+
+F64 = NDArray[np.float64]
+REACTION_S = 0.2
+"""From seeing to acting; simple reactions to something seen take about so long."""
+LOOK_S = 0.04
+"""The state is read so often."""
+MOVES = {
+    0: ("forward", "back"),
+    1: ("left", "right"),
+    2: ("up", "down"),
+}
+"""Gestures of the starter set by axis of the base: towards more, towards less."""
+STARTS_S = 2.0
+"""When a hand at rest has moved nothing for so long, it is lowered and shown again."""
+STILL_M = 0.001
+"""The tool has not come farther than this: it stood."""
+
+
+class CannotDrive(RuntimeError):
+    """The robot does not do what is shown, however often."""
+
+
+class Eyes:
+    """The robot's newest states, read over REST. A context manager."""
+
+    def __init__(self, api: httpx.Client, robot: str = "puma") -> None:
+        self._api = api
+        self._path = f"/api/robots/{robot}"
+        self._seen: deque[tuple[float, State]] = deque(maxlen=100)
+        self._over = threading.Event()
+        self._first = threading.Event()
+        self._thread = threading.Thread(target=self._look, name="eyes", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        if not self._first.wait(20):
+            raise CannotDrive("the robot is not seen")
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._over.set()
+        self._thread.join(20)
+
+    def now(self) -> State:
+        """The newest state; what measures uses this."""
+        return self._seen[-1][1]
+
+    def see(self, ago: float = REACTION_S) -> State:
+        """The state as a person acts on it now: ``ago`` s old."""
+        before = time.monotonic() - ago
+        old = [state for at, state in list(self._seen) if at <= before]
+        return old[-1] if old else self._seen[0][1]
+
+    def _look(self) -> None:
+        while not self._over.wait(LOOK_S):
+            try:
+                answer: dict[str, Any] = self._api.get(self._path).json()
+            except httpx.TransportError:
+                return  # the server is gone, and so is the robot
+            if answer["state"] is not None:
+                state = State.model_validate(answer["state"] | {"fault": answer["fault"]})
+                self._seen.append((time.monotonic(), state))
+                self._first.set()
+
+
+@dataclass(frozen=True)
+class Showing:
+    """One raising of a hand."""
+
+    gesture: str
+    began: float
+    """s, monotonic, as all times here: the hand starts on its way up."""
+    rested: float
+    """It is held still."""
+    moved: float | None
+    """The robot is seen moving; None: it did not."""
+    let_go: float
+    """The hand starts on its way down."""
+    stood: float
+    """The robot is seen standing."""
+    way: float
+    """m, how far the tool came, with its sign along the axis; 0 for other gestures."""
+
+
+@dataclass
+class GestureDriver:
+    """Brings the tool where it is wanted, one axis at a time, and opens and closes the gripper.
+
+    A person knows after a few tries how far the tool runs on after the hand is lowered; so
+    does this: ``runs_on`` is the mean of what was seen.
+    """
+
+    webcam: LiveWebcam
+    eyes: Eyes
+    runs_on: float = 0.04
+    """m, from letting go (as seen then, a reaction late) to standing."""
+    showings: list[Showing] = field(default_factory=list)
+    _learned: list[float] = field(default_factory=list)
+
+    def to(self, axis: int, target: float, within: float, tries: int = 8) -> float:
+        """Bring one coordinate of the tool to ``target``, in one showing or more.
+
+        Returns:
+            How far off it is in the end, m.
+
+        Raises:
+            CannotDrive: it does not come nearer, or the robot is stopped.
+        """
+        for _ in range(tries):
+            off = target - _tool(self.eyes.now())[axis]
+            if abs(off) <= within:
+                return float(off)
+            self._jog(axis, off, target)
+            if self._blocked():
+                return float(target - _tool(self.eyes.now())[axis])
+        raise CannotDrive(
+            f"axis {'xyz'[axis]}: {off * 1e3:+.0f} mm off after {tries} showings of a hand"
+        )
+
+    def grip(self, gesture: str, done: Callable[[State], bool], tries: int = 5) -> None:
+        """Show a gripper's gesture until ``done`` says so of what is seen.
+
+        Raises:
+            CannotDrive: it never did, or the robot is stopped.
+        """
+        for _ in range(tries):
+            if self._show(gesture, None, lambda: done(self.eyes.see()), 3.0) is not None and done(
+                self.eyes.now()
+            ):
+                return
+        raise CannotDrive(f"{gesture!r} has not done what it should in {tries} showings")
+
+    def _jog(self, axis: int, off: float, target: float) -> None:
+        """One showing towards the target."""
+        towards = 1.0 if off > 0 else -1.0
+        gesture = MOVES[axis][0 if off > 0 else 1]
+
+        def there() -> bool:
+            left = towards * (target - _tool(self.eyes.see())[axis])
+            return left <= self.runs_on
+
+        self._show(gesture, axis, there, abs(off) / 0.01)
+
+    def _show(
+        self, gesture: str, axis: int | None, enough: Callable[[], bool], longest: float
+    ) -> float | None:
+        """Raise the hand, hold it until it was enough, lower it, wait until the robot stands.
+
+        Returns:
+            When the robot started to move; None: it did not.
+        """
+        self._ready()
+        began = time.monotonic()
+        start = _tool(self.eyes.now())
+        rested = self.webcam.raise_hand(gesture)
+        moved: float | None = None
+        while True:
+            now = time.monotonic()
+            if moved is None and self.eyes.now().mode == "moving":
+                moved = now
+            if moved is None and now - rested > STARTS_S:
+                break
+            if moved is not None and now - moved >= REACTION_S and enough():
+                break
+            if moved is not None and now - moved > longest:
+                break
+            if moved is not None and now - moved > 1.0 and self.eyes.see().mode != "moving":
+                break  # it has ended by itself, or something holds it
+            time.sleep(0.01)
+        seen = _tool(self.eyes.see())
+        self.webcam.lower_hand(wait=False)
+        let_go = time.monotonic()
+        while self.eyes.now().mode == "moving" and time.monotonic() - let_go < 5:
+            time.sleep(0.01)
+        stood = time.monotonic()
+        self.webcam.lower_hand()
+        end = _tool(self.eyes.now())
+        way = 0.0
+        if axis is not None:
+            way = float(end[axis] - start[axis])
+            if moved is not None and self.eyes.now().mode == "armed":
+                self._learned.append(abs(float(end[axis] - seen[axis])))
+                self.runs_on = float(np.mean(self._learned[-6:]))
+        self.showings.append(Showing(gesture, began, rested, moved, let_go, stood, way))
+        if moved is None:
+            # The sign was not understood: show it a little differently.
+            self.webcam.person = replace(self.webcam.person, seed=self.webcam.person.seed + 1)
+        return moved
+
+    def _ready(self) -> None:
+        """Wait, with the hand down, until the robot may move again."""
+        deadline = time.monotonic() + 10
+        while (state := self.eyes.now()).mode != "armed":
+            if state.mode in ("stopped", "faulted") or time.monotonic() > deadline:
+                raise CannotDrive(f"the robot is {state.mode}: {state.fault or state.reason}")
+            time.sleep(0.01)
+
+    def _blocked(self) -> bool:
+        """Something keeps the tool from going on: it did what was shown, and came nowhere."""
+        last = self.showings[-1]
+        return last.moved is not None and abs(last.way) < STILL_M
+
+
+def _tool(state: State) -> F64:
+    return np.asarray(state.tool_position)
