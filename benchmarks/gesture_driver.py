@@ -36,6 +36,13 @@ STILL_M = 0.001
 """The tool has not come farther than this: it stood."""
 
 
+LEARNS = 0.4
+"""Part of a surprise about how far the tool runs on that is expected the next time."""
+CRAWLS_S = 0.45
+"""Who lowers the hand later than so long after the tool has started does so at its full speed, once
+the hand is down."""
+
+
 class CannotDrive(RuntimeError):
     """The robot does not do what is shown, however often."""
 
@@ -111,16 +118,17 @@ class Showing:
 class GestureDriver:
     """Brings the tool where it is wanted, one axis at a time, and opens and closes the gripper.
 
-    A person knows after a few tries how far the tool runs on after the hand is lowered; so
-    does this: ``runs_on`` is the mean of what was seen.
+    A person knows after a few tries how far the tool runs on after the hand is lowered, from a
+    crawl and from full speed; so does this: ``runs_on`` is what was seen lately.
     """
 
     webcam: LiveWebcam
     eyes: Eyes
-    runs_on: float = 0.04
+    runs_on: dict[str, float] = field(default_factory=lambda: {"crawl": 0.015, "full": 0.06})
     """m, from letting go (as seen then, a reaction late) to standing."""
     showings: list[Showing] = field(default_factory=list)
-    _learned: list[float] = field(default_factory=list)
+    _since: float | None = None
+    """Since when the robot has been seen moving in this showing."""
 
     def to(self, axis: int, target: float, within: float, tries: int = 8) -> float:
         """Bring one coordinate of the tool to ``target``, in one showing or more.
@@ -162,7 +170,7 @@ class GestureDriver:
 
         def there() -> bool:
             left = towards * (target - _tool(self.eyes.see())[axis])
-            return left <= self.runs_on
+            return left <= self.runs_on[self._speed()]
 
         self._show(gesture, axis, there, abs(off) / 0.01)
 
@@ -178,21 +186,28 @@ class GestureDriver:
         began = time.monotonic()
         start = _tool(self.eyes.now())
         rested = self.webcam.raise_hand(gesture)
-        moved: float | None = None
+        moved = self._since = None
         while True:
             now = time.monotonic()
             if moved is None and self.eyes.now().mode == "moving":
-                moved = now
+                moved = self._since = now
             if moved is None and now - rested > STARTS_S:
                 break
             if moved is not None and now - moved >= REACTION_S and enough():
                 break
             if moved is not None and now - moved > longest:
                 break
-            if moved is not None and now - moved > 1.0 and self.eyes.see().mode != "moving":
-                break  # it has ended by itself, or something holds it
+            if (
+                moved is not None
+                and now - moved > REACTION_S
+                and (self.eyes.see().mode != "moving" and self.eyes.see().mode != "armed")
+            ):
+                break  # something holds it: a new showing is needed
+            if moved is not None and now - moved > 1.0 and self.eyes.see().mode == "armed":
+                break  # it has ended by itself
             time.sleep(0.01)
-        seen = _tool(self.eyes.see())
+        speed = self._speed()
+        seen, driving = _tool(self.eyes.see()), self.eyes.now().mode == "moving"
         self.webcam.lower_hand(wait=False)
         let_go = time.monotonic()
         while self.eyes.now().mode == "moving" and time.monotonic() - let_go < 5:
@@ -203,14 +218,19 @@ class GestureDriver:
         way = 0.0
         if axis is not None:
             way = float(end[axis] - start[axis])
-            if moved is not None and self.eyes.now().mode == "armed":
-                self._learned.append(abs(float(end[axis] - seen[axis])))
-                self.runs_on = float(np.mean(self._learned[-6:]))
+            if driving:
+                runs_on = abs(float(end[axis] - seen[axis]))
+                self.runs_on[speed] += LEARNS * (runs_on - self.runs_on[speed])
         self.showings.append(Showing(gesture, began, rested, moved, let_go, stood, way))
         if moved is None:
             # The sign was not understood: show it a little differently.
             self.webcam.person = replace(self.webcam.person, seed=self.webcam.person.seed + 1)
         return moved
+
+    def _speed(self) -> str:
+        """How fast the tool goes now, as far as a person tells by the time it has gone."""
+        since = self._since
+        return "full" if since is not None and time.monotonic() - since > CRAWLS_S else "crawl"
 
     def _ready(self) -> None:
         """Wait, with the hand down, until the robot may move again."""

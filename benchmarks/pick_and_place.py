@@ -210,21 +210,24 @@ def one_run(folder: Path, seed: int, pictures: Path | None = None) -> Run:
                     f"  shown {showing.let_go - showing.rested:.2f}"
                     f"  stood {showing.stood - showing.let_go:.2f}  way {showing.way:+.3f}"
                 )
-            print(f"    runs on {driver.runs_on:.3f} late {webcam.late}",page.evaluate("window.farhand.frames"))
+            print(
+                f"    runs on {driver.runs_on} late {webcam.late}",
+                page.evaluate("window.farhand.frames"),
+            )
     finally:
         stop_server(server)
     return run
 
 
-def _look(
-    api: httpx.Client, page: Page, pictures: Path | None, seed: int, name: str
-) -> None:
+def _look(api: httpx.Client, page: Page, pictures: Path | None, seed: int, name: str) -> None:
     """Keep what the robot's cameras show, and the page at the end."""
     if pictures is None:
         return
     stem = f"{seed}-{name.replace(' ', '-')}"
     for camera in ("scene", "wrist"):
-        (pictures / f"{stem}-{camera}.jpg").write_bytes(api.get(f"/api/cameras/{camera}.jpg").content)
+        (pictures / f"{stem}-{camera}.jpg").write_bytes(
+            api.get(f"/api/cameras/{camera}.jpg").content
+        )
     if name == "end":
         page.screenshot(path=pictures / f"{stem}-page.png")
 
