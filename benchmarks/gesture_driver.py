@@ -30,7 +30,7 @@ MOVES = {
     2: ("up", "down"),
 }
 """Gestures of the starter set by axis of the base: towards more, towards less."""
-STARTS_S = 2.0
+STARTS_S = 1.5
 """When a hand at rest has moved nothing for so long, it is lowered and shown again."""
 STILL_M = 0.001
 """The tool has not come farther than this: it stood."""
@@ -124,44 +124,38 @@ class GestureDriver:
 
     webcam: LiveWebcam
     eyes: Eyes
+    patience_s: float = 180.0
+    """From the first showing on; then it gives up."""
     runs_on: dict[str, float] = field(default_factory=lambda: {"crawl": 0.015, "full": 0.06})
     """m, from letting go (as seen then, a reaction late) to standing."""
     showings: list[Showing] = field(default_factory=list)
+    _gives_up: float | None = None
     _since: float | None = None
     """Since when the robot has been seen moving in this showing."""
 
-    def to(self, axis: int, target: float, within: float, tries: int = 8) -> float:
+    def to(self, axis: int, target: float, within: float) -> float:
         """Bring one coordinate of the tool to ``target``, in one showing or more.
 
         Returns:
             How far off it is in the end, m.
 
         Raises:
-            CannotDrive: it does not come nearer, or the robot is stopped.
+            CannotDrive: patience is at its end, or the robot is stopped.
         """
-        for _ in range(tries):
-            off = target - _tool(self.eyes.now())[axis]
-            if abs(off) <= within:
-                return float(off)
+        while abs(off := target - _tool(self.eyes.now())[axis]) > within:
             self._jog(axis, off, target)
             if self._blocked():
-                return float(target - _tool(self.eyes.now())[axis])
-        raise CannotDrive(
-            f"axis {'xyz'[axis]}: {off * 1e3:+.0f} mm off after {tries} showings of a hand"
-        )
+                break
+        return float(off)
 
-    def grip(self, gesture: str, done: Callable[[State], bool], tries: int = 5) -> None:
+    def grip(self, gesture: str, done: Callable[[State], bool]) -> None:
         """Show a gripper's gesture until ``done`` says so of what is seen.
 
         Raises:
-            CannotDrive: it never did, or the robot is stopped.
+            CannotDrive: patience is at its end, or the robot is stopped.
         """
-        for _ in range(tries):
-            if self._show(gesture, None, lambda: done(self.eyes.see()), 3.0) is not None and done(
-                self.eyes.now()
-            ):
-                return
-        raise CannotDrive(f"{gesture!r} has not done what it should in {tries} showings")
+        while not done(self.eyes.now()):
+            self._show(gesture, None, lambda: done(self.eyes.see()), 3.0)
 
     def _jog(self, axis: int, off: float, target: float) -> None:
         """One showing towards the target."""
@@ -170,44 +164,22 @@ class GestureDriver:
 
         def there() -> bool:
             left = towards * (target - _tool(self.eyes.see())[axis])
-            return left <= self.runs_on[self._speed()]
+            return bool(left <= self.runs_on[self._speed()])
 
         self._show(gesture, axis, there, abs(off) / 0.01)
 
     def _show(
         self, gesture: str, axis: int | None, enough: Callable[[], bool], longest: float
-    ) -> float | None:
-        """Raise the hand, hold it until it was enough, lower it, wait until the robot stands.
-
-        Returns:
-            When the robot started to move; None: it did not.
-        """
+    ) -> None:
+        """Raise the hand, hold it until it was enough, lower it, wait until the robot stands."""
         self._ready()
-        began = time.monotonic()
-        start = _tool(self.eyes.now())
+        self._since = None
+        began, start = time.monotonic(), _tool(self.eyes.now())
         rested = self.webcam.raise_hand(gesture)
-        moved = self._since = None
-        while True:
-            now = time.monotonic()
-            if moved is None and self.eyes.now().mode == "moving":
-                moved = self._since = now
-            if moved is None and now - rested > STARTS_S:
-                break
-            if moved is not None and now - moved >= REACTION_S and enough():
-                break
-            if moved is not None and now - moved > longest:
-                break
-            if (
-                moved is not None
-                and now - moved > REACTION_S
-                and (self.eyes.see().mode != "moving" and self.eyes.see().mode != "armed")
-            ):
-                break  # something holds it: a new showing is needed
-            if moved is not None and now - moved > 1.0 and self.eyes.see().mode == "armed":
-                break  # it has ended by itself
+        while not self._lets_go(rested, enough, longest):
             time.sleep(0.01)
-        speed = self._speed()
-        seen, driving = _tool(self.eyes.see()), self.eyes.now().mode == "moving"
+        speed, driving = self._speed(), self.eyes.now().mode == "moving"
+        seen = _tool(self.eyes.see())
         self.webcam.lower_hand(wait=False)
         let_go = time.monotonic()
         while self.eyes.now().mode == "moving" and time.monotonic() - let_go < 5:
@@ -215,17 +187,26 @@ class GestureDriver:
         stood = time.monotonic()
         self.webcam.lower_hand()
         end = _tool(self.eyes.now())
-        way = 0.0
-        if axis is not None:
-            way = float(end[axis] - start[axis])
-            if driving:
-                runs_on = abs(float(end[axis] - seen[axis]))
-                self.runs_on[speed] += LEARNS * (runs_on - self.runs_on[speed])
-        self.showings.append(Showing(gesture, began, rested, moved, let_go, stood, way))
-        if moved is None:
+        way = 0.0 if axis is None else float(end[axis] - start[axis])
+        if axis is not None and driving:
+            runs_on = abs(float(end[axis] - seen[axis]))
+            self.runs_on[speed] += LEARNS * (runs_on - self.runs_on[speed])
+        self.showings.append(Showing(gesture, began, rested, self._since, let_go, stood, way))
+        if self._since is None:
             # The sign was not understood: show it a little differently.
             self.webcam.person = replace(self.webcam.person, seed=self.webcam.person.seed + 1)
-        return moved
+
+    def _lets_go(self, rested: float, enough: Callable[[], bool], longest: float) -> bool:
+        """Whether to lower the hand now, which has been held still since ``rested``."""
+        now, mode = time.monotonic(), self.eyes.now().mode
+        if self._since is None:
+            if mode == "moving":
+                self._since = now
+            return now - rested > STARTS_S
+        if now - self._since < REACTION_S:
+            return False
+        # What holds the robot still, or is done, needs no hand any more.
+        return enough() or now - self._since > longest or self.eyes.see().mode != "moving"
 
     def _speed(self) -> str:
         """How fast the tool goes now, as far as a person tells by the time it has gone."""
@@ -234,6 +215,10 @@ class GestureDriver:
 
     def _ready(self) -> None:
         """Wait, with the hand down, until the robot may move again."""
+        if self._gives_up is None:
+            self._gives_up = time.monotonic() + self.patience_s
+        if time.monotonic() > self._gives_up:
+            raise CannotDrive(f"not done within {self.patience_s:.0f} s")
         deadline = time.monotonic() + 10
         while (state := self.eyes.now()).mode != "armed":
             if state.mode in ("stopped", "faulted") or time.monotonic() > deadline:
