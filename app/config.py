@@ -342,6 +342,16 @@ class ArmMotionSettings(_Section):
         le=1.0,
         description="s from no acceleration to the whole of it, in straight motion",
     )
+    creep_s: float = Field(
+        default=0.6,
+        ge=0.0,
+        le=5.0,
+        description="s; straight motion while a gesture is held begins so long at a crawl, so that "
+        "who shows it briefly moves the tool by a little",
+    )
+    creep: float = Field(
+        default=0.25, ge=0.01, le=1.0, description="part of the speed asked for at that crawl"
+    )
     slow_below: float = Field(
         default=0.10,
         gt=0.0,

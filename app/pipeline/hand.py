@@ -82,7 +82,9 @@ class FindHand:
         watch.lap("binarise")
         palm = self._find_palm(binary.mask)
         watch.lap("palm")
-        if not self._choose.unproved or self.why_none(palm) is not None:
+        none = self.why_none(palm) is not None
+        self._choose.found(0 if none else palm.area)
+        if none or not self._choose.unproved:
             return palm
         learned = self._network(pixels)
         # The network may have looked at a part only; the arm goes on outside of it.

@@ -121,7 +121,7 @@ def test_a_turn_ends_at_its_angle_and_does_not_repeat_until_a_new_hold() -> None
 def test_the_next_gesture_begins_when_the_arm_has_come_to_rest() -> None:
     operator = Operator().ready()
     operator.show(JOG, 1, 0.5)
-    operator.show(JogCartesian(linear=(0.0, 0.0, 0.1)), 2, 1.0)
+    operator.show(JogCartesian(linear=(0.0, 0.0, 0.1)), 2, 1.5)
     assert operator.arm.read().tool.position[2] > 0.75
     steps = np.diff([joints for joints, _ in operator.arm.moves], axis=0)
     assert np.abs(np.diff(steps, axis=0)).max() < 40 * DT**2

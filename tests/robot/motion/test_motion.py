@@ -77,7 +77,7 @@ def test_straight_lines_are_straight_and_as_fast_as_asked(axis: int, speed: floa
     linear = [0.0, 0.0, 0.0]
     linear[axis] = speed
     rig.motion.begin(JogCartesian(linear=tuple(linear)))
-    rig.run(0.5)
+    rig.run(1.0)
     before = rig.arm.read().tool.position
     rig.run(0.5)
     now = rig.arm.read().tool
@@ -92,6 +92,19 @@ def test_straight_lines_are_straight_and_as_fast_as_asked(axis: int, speed: floa
         assert abs(abs(tool.orientation @ start.orientation) - 1) < 1e-6
 
 
+def test_a_held_jog_begins_at_a_crawl_and_one_with_a_duration_does_not() -> None:
+    def way(action: JogCartesian) -> float:
+        rig = Rig()
+        start = rig.arm.read().tool.position
+        rig.do(action, 0.5)
+        return float(np.linalg.norm(rig.arm.read().tool.position - start))
+
+    settings = ArmMotionSettings()
+    held = way(JogCartesian(linear=(0.0, 0.1, 0.0)))
+    assert held == pytest.approx(0.5 * 0.1 * settings.creep, rel=0.1)
+    assert way(JogCartesian(linear=(0.0, 0.1, 0.0), duration=0.5)) == pytest.approx(0.05, rel=0.1)
+
+
 def test_turning_about_the_tool_keeps_its_point() -> None:
     rig = Rig()
     start = rig.arm.read().tool.position
@@ -103,7 +116,7 @@ def test_turning_about_the_tool_keeps_its_point() -> None:
 def test_the_tool_frame_is_the_tools() -> None:
     rig = Rig()
     start = rig.arm.read().tool.position
-    rig.do(JogCartesian(frame="tool", linear=(0.0, 0.0, 0.1)), 0.5)  # points down at home
+    rig.do(JogCartesian(frame="tool", linear=(0.0, 0.0, 0.1)), 1.0)  # points down at home
     moved = rig.arm.read().tool.position - start
     assert moved[2] < -0.04
     assert np.abs(moved[:2]).max() < 1e-3
