@@ -13,8 +13,7 @@ from app.link.actions import Action
 from app.link.gateway_end import GatewayEnd
 from app.link.messages import Command, LeaseRequest, State
 from app.link.session import socket_endpoint
-
-ROBOT = "puma"
+from benchmarks.observer import ROBOT
 
 
 class BenchNode:
@@ -22,11 +21,12 @@ class BenchNode:
 
     Args:
         cameras: Whether the camera process runs, too.
+        endpoint: What it listens on; a socket of its own unless given.
     """
 
-    def __init__(self, *, cameras: bool) -> None:
+    def __init__(self, *, cameras: bool, endpoint: str | None = None) -> None:
         self._folder = Path(tempfile.mkdtemp(prefix="fh-"))
-        self.endpoint = socket_endpoint(self._folder / "n.sock")
+        self.endpoint = endpoint or socket_endpoint(self._folder / "n.sock")
         self._log = (self._folder / "log").open("wb")
         command = [sys.executable, "-m", "app.robot.node", "--endpoint", self.endpoint]
         self._process = subprocess.Popen(
