@@ -1,6 +1,7 @@
 """A robot node for a benchmark: its own process on a private socket, and a way to drive it."""
 
 import shutil
+import socket
 import subprocess
 import sys
 import tempfile
@@ -54,7 +55,7 @@ class Driver:
     """
 
     def __init__(self, endpoint: str, holder: str) -> None:
-        self._holder = holder
+        self.holder = holder
         self._epoch = 0
         self._sequence = 0
         self.end = GatewayEnd(ROBOT, endpoint, timeout=30)
@@ -71,12 +72,12 @@ class Driver:
     def ready(self) -> None:
         """Take control, arm, and show no gesture until the robot is ready."""
         while True:
-            reply = self.end.ask(LeaseRequest(kind="take", holder=self._holder), timeout=5)
+            reply = self.end.ask(LeaseRequest(kind="take", holder=self.holder), timeout=5)
             if reply.granted:
                 break
             time.sleep(0.05)
         self._epoch = reply.epoch or 0
-        request = LeaseRequest(kind="arm", holder=self._holder, epoch=self._epoch)
+        request = LeaseRequest(kind="arm", holder=self.holder, epoch=self._epoch)
         reply = self.end.ask(request, timeout=5)
         if not reply.granted:
             raise RuntimeError(reply.reason)
@@ -106,3 +107,11 @@ class Driver:
             )
             sent(state.tick)
             time.sleep(1 / 30)
+
+
+def free_port() -> int:
+    """A TCP port of loopback on which nobody listens now."""
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        port: int = listener.getsockname()[1]
+        return port
