@@ -36,9 +36,17 @@ class Outcome(NamedTuple):
     """When it was back it was disarmed, nobody had control, and nothing moved."""
 
 
-async def one_fault(rig: Rig, number: signal.Signals) -> Outcome:
-    """Drive, signal the node, and wait until it is back."""
-    healthy = time.monotonic() + HEALTHY_S + 1
+async def one_fault(
+    rig: Rig, number: signal.Signals, *, healthy_s: float = HEALTHY_S + 1
+) -> Outcome:
+    """Drive, signal the node, and wait until it is back.
+
+    Args:
+        rig: The system, with the node as the gateway's child.
+        number: The signal.
+        healthy_s: How long the node has run by then.
+    """
+    healthy = time.monotonic() + healthy_s
     observer = rig.observer
     pictures = clip(rig.next_gesture())
     async with Operator(rig.url, TOKEN) as operator:
