@@ -124,7 +124,9 @@ async def one_stop(rig: Rig, way: str) -> Outcome:
         while not observer.at_full_speed():
             if time.monotonic() > give_up:
                 raise RuntimeError(f"not at full speed: {observer.state}")
-            # Under load a showing can break off; show it anew.
+            # Under load a showing can break off, and the lease run out: show it anew.
+            if not driver.robot["controller"]:
+                await driver.take_and_arm()
             frames = itertools.islice(pictures.shown(), SHOWING)
             await driver.play(frames, until=observer.at_full_speed)
         showing = asyncio.create_task(driver.play(pictures.keep()))
