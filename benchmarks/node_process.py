@@ -16,6 +16,8 @@ from app.link.messages import Command, LeaseRequest, State
 from app.link.session import socket_endpoint
 from benchmarks.observer import ROBOT
 
+_SHOWN_S = 60.0
+
 
 class BenchNode:
     """Starts ``farhand robot`` as a process; used with ``with``.
@@ -90,8 +92,15 @@ class Driver:
         until: Callable[[], bool],
         sent: Callable[[int], None] = lambda tick: None,
     ) -> None:
-        """Send ``action`` until a condition holds; ``sent`` is told each command's tick after."""
+        """Send ``action`` until a condition holds; ``sent`` is told each command's tick after.
+
+        Raises:
+            TimeoutError: it did not hold within a minute.
+        """
+        give_up = time.monotonic() + _SHOWN_S
         while not until():
+            if time.monotonic() > give_up:
+                raise TimeoutError(f"shown for {_SHOWN_S:g} s in vain: {self.state}")
             self._sequence += 1
             state = self.state
             self.end.send(
