@@ -147,8 +147,10 @@ async def one_stop(rig: Rig, way: str) -> Outcome:
         showing.cancel()
         with contextlib.suppress(asyncio.CancelledError, ConnectionClosed):
             await showing
-        latched = all(state.mode == "stopped" for state in observer.states if state.stops) and (
-            observer.state.stop in ("S0", "S1")
+        latched = all(
+            state.mode == "stopped" and state.stop in ("S0", "S1")
+            for state in observer.states
+            if state.tick >= stood.at
         )
         moved = observer.moved_between(stood.at, tick_now())
         return Outcome(stood.since_fault_ms, refused and latched and not moved)
