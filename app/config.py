@@ -442,7 +442,11 @@ class GatewaySettings(_Section):
         default=10.0, ge=1.0, le=30.0, description="masks and templates a second to a detail view"
     )
     robot_silence_ms: int = Field(
-        default=250, ge=100, le=5000, description="no state for this long is shown as a fault"
+        default=200,
+        ge=100,
+        le=5000,
+        description="no state for this long is shown as a fault; with the wait for the next robot "
+        "message a hung node is shown within 300 ms",
     )
     robot_hung_ms: int = Field(
         default=1500,

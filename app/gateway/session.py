@@ -27,6 +27,7 @@ from app.gateway.messages import (
 )
 from app.gateway.numbers import newer, tick_ms
 from app.gateway.outbox import Outbox
+from app.gateway.pace import Pace
 from app.link.header import HEADER_SIZE, FrameHeader
 from app.pipeline.decode import read_header
 
@@ -39,6 +40,10 @@ MAX_STOPS = 8
 """Stops of one session under way at once; one more would tell the robot nothing new."""
 MAX_REQUESTS = 16
 """Requests to the robot that may wait for those before them."""
+MAX_MESSAGES_HZ = 200.0
+"""A client that sends more in the long run is read no faster, so that a flood from one does not
+take the time of all; a page sends less than half of it."""
+MESSAGE_BURST = 100
 IDLE_CHECK_S = 0.05
 CLOSE_BAD = 1007
 CLOSE_TOO_BIG = 1009
@@ -165,10 +170,13 @@ class OperatorSession:
     # Reading
 
     async def _read(self) -> None:
+        pace = Pace(MAX_MESSAGES_HZ, MESSAGE_BURST)
         while True:
             message = await self._socket.receive()
             if message["type"] == "websocket.disconnect":
                 return
+            if (wait := pace.wait_s(time.monotonic())) > 0:
+                await asyncio.sleep(wait)
             self._arrivals += 1
             data, text = message.get("bytes"), message.get("text")
             size = len(data) if data is not None else len(text or "")

@@ -142,10 +142,14 @@ class Transition(Message):
 
 
 class LoopState(Message):
-    """How well the control loop keeps its time, over the last second."""
+    """How well the control loop keeps its time."""
 
-    rate_hz: float
-    late_max_ms: float
+    rate_hz: float = Field(description="over the last second")
+    late_max_ms: float = Field(description="over the last second")
+    cycles: int = Field(default=0, ge=0, description="that were due since the loop started")
+    late: int = Field(
+        default=0, ge=0, description="of these began more than 5 ms after their time, or never"
+    )
 
 
 class State(Message):
