@@ -218,6 +218,13 @@ class ObjectDescription(Message):
     fixed: bool = False
 
 
+class WorkspaceDescription(Message):
+    """The box that the tool may not leave."""
+
+    lower: tuple[float, float, float] = Field(description="m, base frame")
+    upper: tuple[float, float, float] = Field(description="m, base frame")
+
+
 class Description(Message):
     """What a robot is. Key ``/description``, answered on request."""
 
@@ -227,5 +234,7 @@ class Description(Message):
     joints: tuple[JointDescription, ...]
     poses: dict[str, tuple[float, ...]] = Field(description="named joint positions, rad")
     gripper_max: float = Field(description="m")
+    gripper_force: float = Field(default=0.0, description="N, of each finger, unless one is asked")
+    workspace: WorkspaceDescription | None = None
     cameras: tuple[CameraDescription, ...]
     objects: tuple[ObjectDescription, ...] = ()
