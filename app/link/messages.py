@@ -234,7 +234,7 @@ class Description(Message):
     joints: tuple[JointDescription, ...]
     poses: dict[str, tuple[float, ...]] = Field(description="named joint positions, rad")
     gripper_max: float = Field(description="m")
-    gripper_force: float = Field(default=0.0, description="N, of each finger, unless one is asked")
+    gripper_force: float | None = Field(default=None, description="N of each finger, at most")
     workspace: WorkspaceDescription | None = None
     cameras: tuple[CameraDescription, ...]
     objects: tuple[ObjectDescription, ...] = ()

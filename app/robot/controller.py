@@ -66,7 +66,7 @@ class Controller:
         self.reading: Reading = arm.read()
         self._following_error = settings.following_error
         self._contact = ContactWatch(
-            settings.clearance.contact_force, arm.description.gripper_force
+            settings.clearance.contact_force, arm.description.gripper_force or 0.0
         )
         self._fresh_until = -1.0
         self._hold: int | None = None

@@ -38,11 +38,23 @@ class FakeArm:
         self.moves: list[tuple[Vector, Vector]] = []
 
     def read(self) -> Reading:
+        tool = self.kinematics.forward(self.joints)
+        if self.held is not None:  # it goes where the hand goes
+            self.objects = tuple(
+                ObjectState(
+                    name=thing.name,
+                    position=tuple(tool.position),
+                    orientation=tuple(tool.orientation),
+                )
+                if thing.name == self.held
+                else thing
+                for thing in self.objects
+            )
         return Reading(
             joints=self.joints.copy(),
             velocities=self.velocities.copy(),
             gripper=self.width,
-            tool=self.kinematics.forward(self.joints),
+            tool=tool,
             objects=self.objects,
             contacts=self.contacts,
             held=self.held,

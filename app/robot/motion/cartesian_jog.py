@@ -113,7 +113,7 @@ class CartesianJog:
         now, _ = self._solve(jacobian, self._wanted())
         ramp = self._ramp(now)
         target, reasons = (0.0, ()) if over else self._allowed(trajectory, now, ramp)
-        target *= trajectory.scale
+        target = min(target, trajectory.scale) * trajectory.slowed
         self._advance(target, ramp, trajectory.dt)
         self.limits = self._clipped + reasons
         if self._pace < 1e-6 and abs(self._pace_rate) < 1e-4 and target == 0.0:

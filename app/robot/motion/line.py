@@ -61,7 +61,7 @@ class JointLine:
             (given.current_position, given.current_velocity, given.current_acceleration) = (
                 [value] for value in self._now
             )
-            given.max_velocity = [self._speed * max(trajectory.scale, 1e-3)]
+            given.max_velocity = [self._speed * trajectory.scale * trajectory.slowed]
             result = self._ruckig.calculate(given, self._profile)
             if result not in (Result.Working, Result.Finished):
                 raise ArithmeticError(f"ruckig found no profile: {result}")

@@ -166,7 +166,7 @@ class Motion:
         """One step of the task, if nothing is in its way."""
         trajectory, guard = self.trajectory, self.guard
         before = trajectory.now
-        trajectory.scale = guard.scale
+        trajectory.slowed = guard.scale
         try:
             if task.step(trajectory, reading):
                 self._task = None

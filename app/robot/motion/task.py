@@ -16,8 +16,8 @@ class Refused(Exception):
 class Task(Protocol):
     """One action being done. Begins with the arm at rest; ``step`` is called once a cycle.
 
-    ``trajectory.scale`` is the part of its speed that it may use now. A task that ends leaves the
-    arm at rest. In a stop, it just stops being called.
+    ``trajectory.scale`` times ``trajectory.slowed`` is the part of its speed that it may use now. A
+    task that ends leaves the arm at rest. In a stop, it just stops being called.
     """
 
     limits: tuple[str, ...]

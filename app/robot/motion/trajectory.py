@@ -51,7 +51,10 @@ class JointTrajectory:
         self.limits = limits
         self.dt = dt
         self.scale = 1.0
-        """Part of its speed that whoever moves the joints may use now, 0 to 1."""
+        """Part of the ordinary speed at which motion runs. May change at any time: the velocity
+        goes over to the new one within the ordinary acceleration and jerk."""
+        self.slowed = 1.0
+        """Part of that which is left near things; may change in the same way."""
         count = len(joints)
         self.position: Vector = np.zeros(count)
         self.velocity: Vector = np.zeros(count)
@@ -101,7 +104,7 @@ class JointTrajectory:
         if not np.isfinite(wanted).all():
             raise ValueError(f"joint velocities must be finite, not {wanted}")
         pace = self.limits.ordinary
-        wanted = self.scale * np.clip(wanted, -pace.velocity, pace.velocity)
+        wanted = self.scale * self.slowed * np.clip(wanted, -pace.velocity, pace.velocity)
         # Once a joint brakes for its limit it does so to the end, lest it should dither there.
         self._held_back[np.sign(wanted) != self._held_back] = 0.0
         wanted = np.where(self._held_back != 0.0, 0.0, wanted)
