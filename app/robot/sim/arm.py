@@ -259,7 +259,7 @@ class SimulatedArm:
         return tuple(
             Contact(
                 self._link_names[link],
-                self._thing_names.get(body, "something unknown"),
+                self._thing_names.get(body, "unknown_thing"),
                 force,
                 link in self._fingers and body in movable,
             )
