@@ -9,6 +9,7 @@ import pytest
 from app.config import ClearanceSettings
 from app.link.actions import JogCartesian, JogJoint, Pose, TurnJoint
 from app.link.messages import ObjectState
+from app.robot.arm import ToolPose
 from app.robot.models import model_assets
 from app.robot.motion.guard import Margin
 from app.robot.sim.proximity import SimulatedProximity
@@ -194,19 +195,59 @@ def test_the_state_tells_what_is_nearest(proximity: SimulatedProximity) -> None:
     assert clearance.points[1][2] == pytest.approx(0.40, abs=1e-4)
 
 
-def test_a_pose_behind_things_is_reached_round_them(proximity: SimulatedProximity) -> None:
-    """From low beside the tray to low over it: straight on, the fingers would cut its wall."""
-    rig = Watched(proximity, LOW)
-    rig.do(JogCartesian(linear=(0.05, 0.0, -0.2)), 4.0)
-    low = rig.arm.joints.copy()
-    rig.arm.description.poses["low"] = tuple(low)
-    try:
-        rig.motion.begin(Pose(name="inspect"))
-        rig.finish(30.0)
-        rig.motion.begin(TurnJoint(joint=1, angle=0.9))
-        rig.finish(30.0)
-    finally:
-        del rig.arm.description.poses["low"]
+def test_a_pose_behind_a_wall_is_reached_round_it(proximity: SimulatedProximity) -> None:
+    """The fingers are down in the tray, beside its wall; the straight way would cut the wall."""
+    rig = Watched(proximity, in_the_tray())
+    rig.motion.begin(Pose(name="right"))
+    rig.finish(40.0)
+    assert rig.arm.joints == pytest.approx(rig.arm.description.poses["right"])
+    assert "looking for a way that keeps clear of things" in rig.limits
+    assert not any(text.startswith("stopped") for text in rig.limits)
+
+
+def in_the_tray() -> np.ndarray:
+    arm = FakeArm()
+    down = arm.kinematics.forward(arm.home).orientation
+    pose = ToolPose(np.array([0.66, 0.245, 0.425]), down)
+    solution = arm.kinematics.inverse(pose, ASSETS.model.pose("tray"))
+    assert solution.converged
+    return solution.joints
+
+
+def test_a_turn_straight_through_the_same_wall_stops_before_it(
+    proximity: SimulatedProximity,
+) -> None:
+    rig = Watched(proximity, in_the_tray())
+    rig.do(TurnJoint(joint=1, angle=-0.8), 4.0)
+    assert rig.arm.joints[0] > in_the_tray()[0] - 0.2
+    assert any(text.startswith("stopped: ") and "tray right" in text for text in rig.limits)
+
+
+def test_a_pose_that_something_stands_in_is_refused_and_the_arm_stands(
+    proximity: SimulatedProximity,
+) -> None:
+    rig = Watched(proximity)
+    there = rig.arm.kinematics.forward(ASSETS.model.pose("right")).position
+    rig.arm.objects = (
+        ObjectState(
+            name="blue_cylinder",
+            position=(float(there[0]), float(there[1]), float(there[2]) + 0.2),
+            orientation=(1.0, 0.0, 0.0, 0.0),
+        ),
+    )
+    rig.motion.begin(Pose(name="right"))
+    rig.finish(2.0)
+    assert rig.motion.limits == ("the pose right is too near to something now",)
+    assert np.array_equal(rig.arm.joints, rig.arm.home)
+
+
+def test_a_search_that_takes_too_long_is_given_up(proximity: SimulatedProximity) -> None:
+    rig = Watched(proximity, in_the_tray())
+    rig.motion._settings = rig.motion._settings.model_copy(update={"planning_s": 0.02})
+    rig.motion.begin(Pose(name="right"))
+    rig.finish(2.0)
+    assert rig.motion.limits == ("found no way to the pose right that keeps clear of things",)
+    assert np.array_equal(rig.arm.joints, in_the_tray())
 
 
 @pytest.mark.parametrize("seed", range(3))
