@@ -316,6 +316,52 @@ class RobotSettings(_Section):
     )
 
 
+class ClearanceSettings(_Section):
+    """How near an arm may come to things and to itself, and how hard it may touch."""
+
+    slow: float = Field(
+        default=0.10, gt=0.0, le=1.0, description="m; nearer than this, coming nearer is slowed"
+    )
+    stop: float = Field(
+        default=0.020, ge=0.0, le=0.5, description="m; no link of the arm comes nearer to a thing"
+    )
+    stop_itself: float = Field(
+        default=0.010, ge=0.0, le=0.5, description="m; no link comes nearer to another"
+    )
+    stop_hand: float = Field(
+        default=0.004,
+        ge=0.0,
+        le=0.5,
+        description="m; the fingers and what carries them come no nearer to what is fixed. A thing "
+        "on a table is grasped near its middle, and with the arm's own distance the fingers would "
+        "not reach below 20 mm; four times the 1 mm that a servo lags in a slow approach",
+    )
+    stop_held: float = Field(
+        default=0.002,
+        ge=0.0,
+        le=0.5,
+        description="m; what is held comes no nearer to other things: from here it is set down by "
+        "letting go, and drops no farther than a book's cover is thick",
+    )
+    slow_workspace: float = Field(
+        default=0.05,
+        gt=0.0,
+        le=1.0,
+        description="m; nearer than this to the edge of its box, the tool is slowed",
+    )
+    slowest: float = Field(
+        default=0.03, gt=0.0, le=1.0, description="part of the speed that slowing always leaves"
+    )
+    contact_force: float = Field(
+        default=50.0,
+        gt=0.0,
+        le=1000.0,
+        description="N; a contact that presses harder is a collision (S1). Below the 65 N that "
+        "ISO/TS 15066 allows at the most sensitive part of a body (the face), and above the 25 N "
+        "that the fingers press with when they push a light thing over a table",
+    )
+
+
 class ArmMotionSettings(_Section):
     """How a robot node moves its arm, in parts of the arm's own limits.
 
@@ -363,6 +409,10 @@ class ArmMotionSettings(_Section):
         gt=0.0,
         le=1.0,
         description="rad between commanded and measured joint at which the arm counts as blocked",
+    )
+    clearance: ClearanceSettings = ClearanceSettings()
+    planning_s: float = Field(
+        default=8.0, gt=0.0, le=60.0, description="s; longest search for a way round things"
     )
 
 

@@ -224,6 +224,13 @@ class ObjectDescription(Message):
     fixed: bool = False
 
 
+class WorkspaceDescription(Message):
+    """The box that the tool may not leave."""
+
+    lower: tuple[float, float, float] = Field(description="m, base frame")
+    upper: tuple[float, float, float] = Field(description="m, base frame")
+
+
 class Description(Message):
     """What a robot is. Key ``/description``, answered on request."""
 
@@ -233,5 +240,7 @@ class Description(Message):
     joints: tuple[JointDescription, ...]
     poses: dict[str, tuple[float, ...]] = Field(description="named joint positions, rad")
     gripper_max: float = Field(description="m")
+    gripper_force: float | None = Field(default=None, description="N of each finger, at most")
+    workspace: WorkspaceDescription | None = None
     cameras: tuple[CameraDescription, ...]
     objects: tuple[ObjectDescription, ...] = ()

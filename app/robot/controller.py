@@ -23,6 +23,7 @@ from app.link.messages import (
 )
 from app.robot.arm import Arm, Reading
 from app.robot.command_gate import CommandGate
+from app.robot.contact import ContactWatch
 from app.robot.latch import StopLatch
 from app.robot.lease import Lease
 from app.robot.motion.motion import Motion
@@ -74,6 +75,9 @@ class Controller:
         self.braked = False
         self.reading: Reading = arm.read()
         self._following_error = settings.following_error
+        self._contact = ContactWatch(
+            settings.clearance.contact_force, arm.description.gripper_force or 0.0
+        )
         self._fresh_until = -1.0
         self._hold: int | None = None
         """The showing of a gesture whose action is being done."""
@@ -179,6 +183,7 @@ class Controller:
             frame=self._frame if motion.busy else None,
             action=motion.action,
             limits=motion.limits,
+            clearance=motion.guard.clearance,
             dropped=dict(self.gate.dropped),
             doubt=self._doubt,
             scale=motion.trajectory.scale,
@@ -294,11 +299,17 @@ class Controller:
         self.motion.reset(self.reading.joints)
         self.arm.brake(engaged)
         self.braked = engaged
+        self._contact.released(self.reading.contacts)
         log.info("brakes %s", "on" if engaged else "off")
 
     def _watch_arm(self) -> None:
-        """An arm that does not follow is blocked, or broken: S1."""
+        """An arm that has hit something, or does not follow: S1."""
         if self.braked or self.safety.phase is Phase.STOPPED:
+            return
+        touched = self._contact.collision(self.reading.contacts, self.motion.guard.plain)
+        if touched is not None:
+            self.fault = f"collision: {touched}"
+            self.safety.stop(StopRequest(source="arm", reason=self.fault))
             return
         error = self.reading.joints - self.motion.trajectory.position
         worst = int(np.abs(error).argmax())

@@ -122,7 +122,8 @@ class CartesianJog:
         if self._crawl_left > 0:
             self._crawl_left -= trajectory.dt
             target = min(target, self._settings.creep)
-        self._advance(min(target, trajectory.scale), ramp, trajectory.dt)
+        target = min(target, trajectory.scale) * trajectory.slowed
+        self._advance(target, ramp, trajectory.dt)
         self.limits = self._clipped + reasons
         if self._pace < 1e-6 and abs(self._pace_rate) < 1e-4 and target == 0.0:
             trajectory.brake()
