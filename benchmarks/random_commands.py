@@ -71,6 +71,9 @@ class StillArm:
         most = 2 * self.model.gripper.speed * DT
         self.width += float(np.clip(self.wanted - self.width, -most, most))
 
+    def reset_scene(self) -> None:
+        """Nothing here moves by itself."""
+
     def close(self) -> None:
         """Give the Bullet world back."""
         self.proximity.close()

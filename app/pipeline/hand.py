@@ -48,6 +48,7 @@ class FindHand:
 
     Attributes:
         way: How the last mask was made, and why so.
+        looks: How often the network ran for it.
     """
 
     def __init__(self, settings: PipelineSettings) -> None:
@@ -64,9 +65,11 @@ class FindHand:
         self._two = False
         self._contrast = self._sure = 0.0
         self.way = Way("threshold", "")
+        self.looks = 0
 
     def __call__(self, pixels: U8, watch: Stopwatch) -> Palm:
         """Find the hand in (h, w, 3) BGR or (h, w, 1) grey."""
+        self.looks = 0
         self.way = self._choose(pixels)
         watch.lap("choose")
         if self.way.mode == "learned":
@@ -109,7 +112,9 @@ class FindHand:
         # Made when first needed: with the threshold alone the network is never loaded.
         if self._learned is None:
             self._learned = LearnedMask()
-        return self._learned(pixels)
+        masked = self._learned(pixels)
+        self.looks += self._learned.looks
+        return masked
 
     def two_hands(self, palm: Palm) -> bool:
         """Whether there is a second hand beside the one that was just found.

@@ -136,6 +136,7 @@ class Pipeline:
             timing_ms=watch.timing_ms,
             event=event,
             gesture=self._agree.gesture,
+            looks=self._find_hand.looks,
         )
 
 

@@ -95,6 +95,7 @@ class FrameResult:
         timing_ms: Time spent in each stage, and ``total``.
         event: What changed with this frame.
         gesture: The gesture that is held now.
+        looks: How often the mask network ran; 0 by threshold, and when the last mask stands.
     """
 
     seq: int
@@ -113,6 +114,7 @@ class FrameResult:
     distances: Mapping[str, float] = field(default_factory=dict)
     cause: Cause | None = None
     digest: int = 0
+    looks: int = 0
 
     def as_message(self, tick: int = 0) -> dict[str, Any]:
         """The ``frame`` message of docs/protocol.md. A match that was not accepted is null."""

@@ -156,6 +156,16 @@ def test_timing_names_every_stage():
     assert sum(timing.values()) == pytest.approx(total, abs=0.5)
 
 
+def test_results_tell_how_often_the_network_ran():
+    """On the first frame of all, and not on the next, which shows the same."""
+    learned = pipeline(binarise=SETTINGS.binarise.model_copy(update={"mode": "learned"}))
+    first, second = show(learned, [jpeg(draw("two"))] * 2)
+    assert first.looks >= 1
+    assert second.looks == 0
+    threshold = pipeline(binarise=SETTINGS.binarise.model_copy(update={"mode": "threshold"}))
+    assert show(threshold, [jpeg(draw("two"))])[0].looks == 0
+
+
 def test_message_is_plain_json():
     result = show(pipeline(), [jpeg(draw("two"))] * 10)[-1]
     message = json.loads(json.dumps(result.as_message(tick=7), allow_nan=False))

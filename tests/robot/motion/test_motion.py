@@ -3,6 +3,7 @@ import random
 import numpy as np
 import pytest
 
+from app.config import ArmMotionSettings
 from app.link.actions import (
     Action,
     Gripper,
