@@ -227,5 +227,6 @@ class Description(Message):
     joints: tuple[JointDescription, ...]
     poses: dict[str, tuple[float, ...]] = Field(description="named joint positions, rad")
     gripper_max: float = Field(description="m")
+    gripper_force: float | None = Field(default=None, description="N of each finger, at most")
     cameras: tuple[CameraDescription, ...]
     objects: tuple[ObjectDescription, ...] = ()

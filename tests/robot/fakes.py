@@ -22,6 +22,7 @@ class FakeArm:
         self.velocities = np.zeros(6)
         self.width = model.gripper.width
         self.wanted_width = self.width
+        self.force: float | None = None
         self.blocked_at: float | None = None
         """m; a thing between the fingers."""
         self.stuck = False
@@ -44,8 +45,8 @@ class FakeArm:
         if not self.braked and not self.stuck:
             self.joints, self.velocities = joints.copy(), velocities.copy()
 
-    def grip(self, width: float) -> None:
-        self.wanted_width = width
+    def grip(self, width: float, force: float | None = None) -> None:
+        self.wanted_width, self.force = width, force
 
     def brake(self, engaged: bool) -> None:
         self.braked = engaged

@@ -169,6 +169,7 @@ class Model(_Part):
             ),
             poses=self.poses,
             gripper_max=self.gripper.width,
+            gripper_force=self.gripper.force,
             cameras=tuple(
                 CameraDescription(
                     name=camera.name,

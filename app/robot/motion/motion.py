@@ -1,7 +1,5 @@
 """One action at a time, from rest to rest."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from app.config import ArmMotionSettings
@@ -23,14 +21,18 @@ from app.link.actions import (
 from app.robot.arm import Arm, Reading, Vector
 from app.robot.motion import sequence
 from app.robot.motion.ask_for_stop import AskForStop
+from app.robot.motion.at_work import AtWork
 from app.robot.motion.cartesian_jog import CartesianJog
 from app.robot.motion.go_to import GoTo
 from app.robot.motion.grip import Grip
 from app.robot.motion.joint_jog import JointJog
 from app.robot.motion.limits import Limits
-from app.robot.motion.task import Task
+from app.robot.motion.move_linear import LinearMove
+from app.robot.motion.repeat import Place, counted_out
+from app.robot.motion.task import Task, why_given_up
 from app.robot.motion.trajectory import JointTrajectory
 from app.robot.motion.turn_joint import JointTurn
+from app.robot.motion.wait import Pause
 
 _FINGERS_STILL = 0.002
 """m/s"""
@@ -58,7 +60,11 @@ class Motion:
         """What is being done, until the arm is at rest again."""
         self.wants_stop = False
         """A sequence has come to a stop: the caller is to stop the robot."""
+        self.gave_up: AtWork | None = None
+        """Why the newest action ended although it was not done."""
         self._task: Task | None = None
+        self._limits: tuple[str, ...] = ()
+        self._force: float | None = None
         self._braking_hard = False
         self._width: float | None = None
         self._finger_speed = 0.0
@@ -75,23 +81,28 @@ class Motion:
 
     @property
     def limits(self) -> tuple[str, ...]:
-        """Limits at work, in plain words."""
-        return self._task.limits if self._task is not None else ()
+        """Limits at work in the newest step, in plain words."""
+        return self._limits
 
-    def refusal(self, action: Action | Step) -> str | None:
+    @property
+    def place(self) -> Place | None:
+        """The step of a sequence that is being done."""
+        return self._task.place if isinstance(self._task, sequence.Sequence) else None
+
+    def refusal(self, action: Action | Step) -> AtWork | None:
         """Why this arm cannot do ``action``, in plain words; None when it can."""
-        if isinstance(action, MoveLinear | Wait | Repeat):
-            return f"this arm cannot do {action.type} yet"
-        if isinstance(action, Sequence):
+        if isinstance(action, Sequence | Repeat):
             for number, step in enumerate(action.steps, start=1):
                 if (reason := self.refusal(step)) is not None:
-                    return f"step {number}: {reason}"
+                    return reason.at(f"step {number}")
             return None
         poses = self._arm.description.poses
         if isinstance(action, Pose) and action.name not in poses:
-            return f"this robot has no pose {action.name!r}; it has: {', '.join(sorted(poses))}"
+            text = f"this robot has no pose {action.name!r}; it has: {', '.join(sorted(poses))}"
+            return AtWork(text, "unknown_pose")
         if isinstance(action, JogJoint | TurnJoint) and action.joint > len(self._joints):
-            return f"this robot has no joint {action.joint}; it has {len(self._joints)}"
+            text = f"this robot has no joint {action.joint}; it has {len(self._joints)}"
+            return AtWork(text, "unknown_joint")
         return None
 
     def begin(self, action: Action) -> None:
@@ -105,6 +116,7 @@ class Motion:
         if (reason := self.refusal(action)) is not None:
             raise ValueError(reason)
         self._task = self._task_of(action)
+        self.gave_up = None
         self._braking_hard = False
         self.action = action
 
@@ -133,8 +145,12 @@ class Motion:
         if self._width is not None:
             self._finger_speed = (reading.gripper - self._width) / self.trajectory.dt
         self._width = reading.gripper
+        self._limits = ()
         if self._task is not None:
-            if self._task.step(self.trajectory, reading):
+            ended = self._task.step(self.trajectory, reading)
+            self._limits = self._task.limits
+            if ended:
+                self.gave_up = why_given_up(self._task)
                 self._task = None
         else:
             self.trajectory.brake(hard=self._braking_hard)
@@ -146,7 +162,7 @@ class Motion:
         """Fingers on their way stop where they are; fingers that hold something go on holding."""
         gripping = isinstance(self.action, Gripper | Sequence)
         if gripping and self._width is not None and abs(self._finger_speed) > _FINGERS_STILL:
-            self._arm.grip(self._width)
+            self._arm.grip(self._width, self._force)
 
     def _task_of(self, action: Action | Step) -> Task:
         match action:
@@ -156,6 +172,10 @@ class Motion:
                 return CartesianJog(
                     action, self._arm.kinematics, self.trajectory.limits, self._settings
                 )
+            case MoveLinear():
+                return LinearMove(
+                    action, self._arm.kinematics, self.trajectory.limits, self._settings
+                )
             case TurnJoint():
                 return JointTurn(action, self._joints)
             case Pose():
@@ -163,19 +183,28 @@ class Motion:
             case Home():
                 return GoTo(self._arm.home.copy())
             case Gripper():
-                widest = self._arm.description.gripper_max
-                width = min(action.width, widest)
-                clipped = (f"the gripper opens to {widest:.3f} m",) if width < action.width else ()
-                return Grip(width, self._arm.grip, clipped)
+                return self._grip_of(action)
+            case Wait():
+                return Pause(action)
             case Sequence():
-                return sequence.Sequence([self._maker(step) for step in action.steps])
+                return sequence.Sequence(tuple(counted_out(action)), self._task_of)
             case Stop():
                 return AskForStop(self._ask_for_stop)
-            case MoveLinear() | Wait() | Repeat():
-                raise ValueError(f"this arm cannot do {action.type} yet")
+            case Repeat():
+                raise ValueError("a repeat is done only in a sequence")
+
+    def _grip_of(self, action: Gripper) -> Grip:
+        widest = self._arm.description.gripper_max
+        strongest = self._arm.description.gripper_force
+        width, force = min(action.width, widest), action.force
+        clipped: list[str] = []
+        if width < action.width:
+            clipped.append(AtWork(f"the gripper opens to {widest:.3f} m", "gripper"))
+        if force is not None and strongest is not None and force > strongest:
+            clipped.append(AtWork(f"the gripper presses with {strongest:g} N at most", "gripper"))
+            force = strongest
+        self._force = force
+        return Grip(width, force, self._arm.grip, tuple(clipped))
 
     def _ask_for_stop(self) -> None:
         self.wants_stop = True
-
-    def _maker(self, step: Step) -> Callable[[], Task]:
-        return lambda: self._task_of(step)

@@ -3,6 +3,7 @@
 from typing import Protocol
 
 from app.robot.arm import Reading
+from app.robot.motion.at_work import AtWork
 from app.robot.motion.trajectory import JointTrajectory
 
 
@@ -31,3 +32,12 @@ class Task(Protocol):
             False: do not call ``step`` any more; the caller brakes.
         """
         ...
+
+
+def why_given_up(task: Task) -> AtWork | None:
+    """Why a task ended although it was not done; None when it was, or has not ended.
+
+    A task that can give up says so in an attribute ``gave_up``.
+    """
+    why: AtWork | None = getattr(task, "gave_up", None)
+    return why
