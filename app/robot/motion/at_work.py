@@ -14,6 +14,7 @@ LimitKind = Literal[
     "unknown_pose",
     "unknown_joint",
     "never_ends",
+    "too_long",
     "other",
 ]
 """``speed``: less fast than asked for. ``slowed``: for a while, to keep clear of another limit."""
@@ -27,16 +28,20 @@ class AtWork(str):
     """
 
     kind: LimitKind
+    plain: str
+    """The text without the places it was said of."""
 
     def __new__(cls, text: str, kind: LimitKind) -> "AtWork":
         """``text`` with its kind."""
         made = super().__new__(cls, text)
-        made.kind = kind
+        made.kind, made.plain = kind, text
         return made
 
     def at(self, place: str) -> "AtWork":
         """The same, said of a place: ``step 2 of 3: ...``."""
-        return AtWork(f"{place}: {self}", self.kind)
+        made = AtWork(f"{place}: {self}", self.kind)
+        made.plain = self.plain
+        return made
 
 
 def with_kind(text: str) -> AtWork:
