@@ -32,7 +32,7 @@ from app.link.session import socket_endpoint
 log = logging.getLogger(__name__)
 
 TEND_S = 0.2
-DRY_RUN_S = 20.0
+DRY_RUN_S = 30.0
 """A check breaks off after 12 s by itself; on a slow machine its arm has to be made first."""
 RESEND_S = 0.1
 """A stop that is not confirmed is sent again this often."""

@@ -201,7 +201,7 @@ class GatewayEnd:
         """
         return self._ask("description", Description, b"", timeout)
 
-    def dry_run(self, request: DryRunRequest, timeout: float = 20.0) -> DryRunReport:
+    def dry_run(self, request: DryRunRequest, timeout: float = 30.0) -> DryRunReport:
         """Ask what an action would do; nothing moves. Blocks up to ``timeout`` s.
 
         Raises:
@@ -266,10 +266,9 @@ class GatewayEnd:
                     self.invalid[kind.__name__.lower()] += 1
         except zenoh.ZError as error:
             log.debug("%s: %s", what, error)
-        waited = "in time" if time.monotonic() < deadline else f"within {timeout:g} s"
-        raise RobotUnavailable(
-            f"the robot node {self.robot!r} did not answer {waited}", robot=self.robot
-        )
+        silent = time.monotonic() >= deadline
+        what = f"did not answer within {timeout:g} s" if silent else "cannot answer that yet"
+        raise RobotUnavailable(f"the robot node {self.robot!r} {what}", robot=self.robot)
 
     def _take_state(self, payload: bytes) -> None:
         state = decode(State, payload)

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
-NICENESS = 10
-"""The control loop goes first."""
+NICENESS = 5
+"""The control loop and the operator's frames go first; pictures, which wait for nobody, do not."""
 IDLE_S = 0.5
 
 

@@ -217,8 +217,8 @@ class LinearMove(CartesianJog):
     def _give_up(self, part: float, why: AtWork) -> None:
         """End, having gone along ``part`` of the line."""
         text = (
-            f"only {100 * self._size * part:.1f} cm of {100 * self._size:.1f} cm of the straight "
-            "line can be gone"
+            f"only {100 * self._size * part:.1f} cm of {100 * self._size:.1f} cm can be reached "
+            "in a straight line"
             if self._size > 0
             else f"only {100 * part:.0f}% of the turn can be made"
         )

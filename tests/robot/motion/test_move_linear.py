@@ -86,7 +86,11 @@ def test_the_speed_is_the_one_asked_for_and_the_robots_own_otherwise() -> None:
 @pytest.mark.parametrize(
     ("offset", "kind", "text"),
     [
-        ((1.0, 0.0, 0.0), "unreachable", "only 32.0 cm of 100.0 cm of the straight line can be"),
+        (
+            (1.0, 0.0, 0.0),
+            "unreachable",
+            "only 32.0 cm of 100.0 cm can be reached in a straight line: it is",
+        ),
         ((0.1, 0.0, 0.6), "joint_limit", "joint 5 would pass its limit"),
     ],
 )
