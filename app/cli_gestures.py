@@ -8,7 +8,7 @@ import typer
 from pydantic import ValidationError
 
 from app.config import Settings
-from app.errors import CannotStart, ImageRefused, Invalid
+from app.errors import CannotStart, ImageRefused, Invalid, NotFound
 from app.gestures import GestureStore
 from app.link.actions import ACTION
 
@@ -56,6 +56,7 @@ def list_gestures(
                 "action": ACTION.dump_python(gesture.action, mode="json", exclude_none=True),
                 "samples": len(gesture.samples),
                 "active": gesture.active,
+                "version": gesture.version,
             }
             for gesture in gestures
         ]
@@ -98,6 +99,47 @@ def import_(
         print(f"imported; the database now holds {len(store.list())} gestures")
     finally:
         store.close()
+
+
+@gestures_app.command("dry-run")
+def dry_run(
+    name: Annotated[str, typer.Argument(help="Name of the gesture.")],
+    start: Annotated[
+        str, typer.Option("--from", help="Pose of the robot where the arm begins.")
+    ] = "home",
+    data_dir: DataDir = None,
+) -> None:
+    """Say whether what a gesture does would break a limit. Needs no server; nothing moves."""
+    from app.config import ArmMotionSettings
+    from app.gestures.records import name_key
+    from app.robot.rehearsal import STEP_S, Rehearsal
+    from app.robot.sim.kinematic_arm import KinematicArm
+
+    store = open_store(settings_for(data_dir=data_dir))
+    try:
+        found = {name_key(gesture.name): gesture for gesture in store.list()}
+    finally:
+        store.close()
+    gesture = found.get(name_key(name))
+    if gesture is None:
+        raise NotFound(f"there is no gesture {name!r}; list them with: farhand gestures list")
+    arm = KinematicArm(dt=STEP_S)
+    try:
+        poses = arm.description.poses
+        if start not in poses:
+            names = ", ".join(sorted(poses))
+            raise Invalid(f"this robot has no pose {start!r} to begin at; it has: {names}")
+        arm.place(arm.model.pose(start), arm.model.gripper.width, ())
+        report = Rehearsal(arm, ArmMotionSettings()).run(gesture.action)
+    finally:
+        arm.close()
+    for problem in report.problems:
+        place = "" if problem.step is None else f"step {problem.step}: "
+        print(f"{problem.time_s:7.2f} s  {place}{problem.message}")
+    verdict = "can be done" if report.ok else "would meet a limit"
+    print(f"{gesture.name} {verdict}; it takes {report.duration_s:.1f} s")
+    if not report.ok:
+        raise typer.Exit(1)
 
 
 def draw_starter_set(

@@ -428,6 +428,7 @@ class NodeSettings(_Section):
         default=None, description="file that keeps the latched stop over a restart"
     )
     cameras: bool = Field(default=True, description="start the camera process, too")
+    dry_runs: bool = Field(default=True, description="start the process that checks programs, too")
     parent: int | None = Field(
         default=None,
         ge=1,

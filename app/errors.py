@@ -9,6 +9,7 @@
     │   ├── ImageRefused          an enrolment image without a usable hand
     │   ├── NotFound              an id that does not exist
     │   ├── Duplicate             a name that is taken
+    │   ├── ChangedMeanwhile      a change of something that somebody else has changed
     │   ├── Invalid               a value out of its bounds
     │   ├── TooLarge              more bytes than allowed
     │   ├── NotSignedIn           no token, or a wrong one
@@ -87,6 +88,13 @@ class Duplicate(RequestError):
     """A name that is taken already."""
 
     default_code = "duplicate"
+    status = 409
+
+
+class ChangedMeanwhile(RequestError):
+    """A change of something that has been changed since the caller read it."""
+
+    default_code = "changed_meanwhile"
     status = 409
 
 

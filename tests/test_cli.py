@@ -170,3 +170,21 @@ def test_the_wheel_works_in_an_empty_folder(tmp_path: Path) -> None:
         assert where.startswith(str(tmp_path / "site"))
     finally:
         stop_server(server)
+
+
+def test_a_program_is_tried_without_a_server(tmp_path: Path, photo: Path) -> None:
+    data = ("--data-dir", str(tmp_path / "data"))
+    far = '{"type":"move_linear","offset":[1.0,0,0]}'
+    steps = f'{{"type":"sequence","steps":[{{"type":"home"}},{far}]}}'
+    farhand("enroll", "reach", str(photo), "--action", steps, *data)
+    done = farhand("gestures", "dry-run", "REACH", *data, fails=True)
+    first, last = done.stdout.splitlines()
+    assert "s  step 2: only " in first
+    assert last.startswith("reach would meet a limit; it takes ")
+    done = farhand("gestures", "dry-run", "forward", "--from", "left", *data)
+    assert done.stdout.startswith("forward can be done; it takes 2.")
+    for arguments, text in (
+        (("nothing",), "there is no gesture 'nothing'"),
+        (("forward", "--from", "moon"), "no pose 'moon' to begin at; it has: home, inspect"),
+    ):
+        assert text in farhand("gestures", "dry-run", *arguments, *data, fails=True).stderr

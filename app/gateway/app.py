@@ -12,7 +12,15 @@ from starlette.staticfiles import StaticFiles
 
 from app.config import Settings
 from app.errors import CannotStart, NotSignedIn
-from app.gateway import cameras, rest_gestures, rest_robots, rest_server, viser_proxy
+from app.gateway import (
+    cameras,
+    rest_dry_run,
+    rest_gestures,
+    rest_programs,
+    rest_robots,
+    rest_server,
+    viser_proxy,
+)
 from app.gateway.auth import Gatekeeper, load_token
 from app.gateway.errors import error_response, install_error_handlers
 from app.gateway.guard import Guard, signed_out_page
@@ -103,7 +111,9 @@ def create_app(
     for router in (
         pages,
         rest_gestures.router,
+        rest_programs.router,
         rest_robots.router,
+        rest_dry_run.router,
         cameras.router,
         cameras.sockets,
         rest_server.router,

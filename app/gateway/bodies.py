@@ -76,6 +76,27 @@ PATCH_BODY: dict[str, Any] = {
                     "name": {"type": "string"},
                     "action": {"type": "object"},
                     "active": {"type": "boolean"},
+                    "version": {"type": "integer", "description": "the newest one known"},
+                },
+                "additionalProperties": False,
+            }
+        }
+    },
+}
+DRY_RUN_BODY: dict[str, Any] = {
+    "required": True,
+    "content": {
+        "application/json": {
+            "schema": {
+                "type": "object",
+                "required": ["action"],
+                "properties": {
+                    "action": {"type": "object"},
+                    "from": {
+                        "type": "string",
+                        "default": "current",
+                        "description": "'current', 'home' or the name of a pose",
+                    },
                 },
                 "additionalProperties": False,
             }

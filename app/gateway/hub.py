@@ -63,6 +63,8 @@ class Hub:
         self.sessions: set[OperatorSession] = set()
         self.relay = Relay(robot, lambda name: self.metrics.pictures.labels(name).inc())
         self.closing = asyncio.Event()
+        self.checking = asyncio.Lock()
+        """Held while a program is being checked."""
         self._link_threads = ThreadPoolExecutor(LINK_THREADS, "link")
         self._stop_threads = ThreadPoolExecutor(STOP_THREADS, "stop")
         self._told_version = gallery.current.version

@@ -1,16 +1,14 @@
 """REST: the gesture database, and recognising one image."""
 
 import asyncio
-import json
 from typing import TYPE_CHECKING, Annotated, Any
 
 from fastapi import APIRouter, Query, Request
-from pydantic import ValidationError
 from starlette.responses import Response
 
 from app.config import PipelineSettings
 from app.errors import ImageRefused, Invalid, NotFound
-from app.gateway.bodies import CHECK_BODY, ENROL_BODY, IMAGE_BODY, PATCH_BODY, SAMPLES_BODY
+from app.gateway.bodies import CHECK_BODY, ENROL_BODY, IMAGE_BODY, SAMPLES_BODY
 from app.gateway.enrolment import (
     Judged,
     confusions_json,
@@ -19,20 +17,18 @@ from app.gateway.enrolment import (
     matrix_json,
     run,
 )
-from app.gateway.errors import describe_validation
 from app.gateway.gallery import Enrolled
-from app.gateway.uploads import UnsupportedMedia, read_enrolment, read_image
+from app.gateway.json_bodies import parse_action, parse_json
+from app.gateway.uploads import read_enrolment, read_image
 from app.gestures import Gesture, template_png
 from app.gestures.records import clean_name
-from app.link.actions import ACTION, Action
+from app.link.actions import ACTION
 from app.pipeline import extract_template
 
 if TYPE_CHECKING:
     from app.gateway.hub import Hub
 
 router = APIRouter(prefix="/api", tags=["gestures"])
-
-MAX_JSON = 64 * 1024
 
 
 def gesture_json(gesture: Gesture) -> dict[str, Any]:
@@ -42,6 +38,7 @@ def gesture_json(gesture: Gesture) -> dict[str, Any]:
         "name": gesture.name,
         "action": ACTION.dump_python(gesture.action, mode="json", exclude_none=True),
         "active": gesture.active,
+        "version": gesture.version,
         "samples": len(gesture.samples),
         "sample_ids": [sample.id for sample in gesture.samples],
         "created": gesture.created.isoformat(),
@@ -49,39 +46,8 @@ def gesture_json(gesture: Gesture) -> dict[str, Any]:
     }
 
 
-def parse_json(text: str | bytes, what: str) -> Any:
-    """Parse JSON that somebody sent; NaN and infinity are not JSON.
-
-    Raises:
-        Invalid: it is not JSON.
-    """
-
-    def no_constant(name: str) -> float:
-        raise ValueError(f"{name} is not a JSON number")
-
-    try:
-        return json.loads(text, parse_constant=no_constant)
-    except (ValueError, RecursionError) as error:
-        raise Invalid(f"{what} is not JSON: {error}"[:300], field=what) from None
-
-
-def parse_action(value: Any) -> Action:
-    """An action that somebody sent.
-
-    Raises:
-        Invalid: with the first thing that is wrong.
-    """
-    try:
-        # Through JSON, so that lists become tuples as they do in the database.
-        return ACTION.validate_json(json.dumps(value))
-    except ValidationError as error:
-        message, fields = describe_validation(error)
-        raise Invalid(f"action: {message}", code="bad_action", fields=fields) from None
-    except (RecursionError, ValueError) as error:
-        raise Invalid(f"action: {error}"[:300], code="bad_action") from None
-
-
-def _hub(request: Request) -> "Hub":
+def hub_of(request: Request) -> "Hub":
+    """What the routes share."""
     hub: Hub = request.app.state.hub
     return hub
 
@@ -89,7 +55,7 @@ def _hub(request: Request) -> "Hub":
 @router.get("/gestures", summary="All enrolled gestures")
 async def list_gestures(request: Request) -> list[dict[str, Any]]:
     """All gestures, in the order in which they were enrolled."""
-    gestures = await asyncio.to_thread(_hub(request).store.list)
+    gestures = await asyncio.to_thread(hub_of(request).store.list)
     return [gesture_json(gesture) for gesture in gestures]
 
 
@@ -109,7 +75,7 @@ async def create_gesture(request: Request, response: Response) -> dict[str, Any]
 
     With ``burst`` the images are the frames of a few seconds, of which the best are kept.
     """
-    hub = _hub(request)
+    hub = hub_of(request)
     upload = await read_enrolment(request, hub.settings.gateway, {"name", "action", "active"})
     for field in ("name", "action"):
         if field not in upload.fields:
@@ -118,7 +84,7 @@ async def create_gesture(request: Request, response: Response) -> dict[str, Any]
     name = clean_name(upload.fields["name"])
     action = parse_action(parse_json(upload.fields["action"], "action"))
     judged = await judge_for_enrolment(hub, upload.images, burst=upload.burst)
-    confusions = await _confusions(hub, name, judged.templates)
+    confusions = await confusions_of(hub, name, judged.templates)
     gesture = await asyncio.to_thread(
         hub.store.create, name, action, judged.templates, active=active
     )
@@ -127,9 +93,10 @@ async def create_gesture(request: Request, response: Response) -> dict[str, Any]
     return _enrolled_json(gesture, judged, upload.burst, confusions)
 
 
-async def _confusions(
+async def confusions_of(
     hub: "Hub", name: str, templates: list[bytes], besides: str | None = None
 ) -> list[dict[str, Any]]:
+    """What a gesture with these templates may be confused with; ``besides`` is its own id."""
     gestures = await asyncio.to_thread(hub.store.list)
     settings, threshold = hub.settings.pipeline, hub.gallery.current.matcher.max_distance
     return await run(hub, confusions_json, gestures, settings, threshold, name, templates, besides)
@@ -154,7 +121,7 @@ def _enrolled_json(
 )
 async def check_gesture(request: Request) -> dict[str, Any]:
     """Judge images before they are enrolled: are they good, and what may be confused with them?"""
-    hub = _hub(request)
+    hub = hub_of(request)
     known = {"name", "action", "active", "gesture"}
     upload = await read_enrolment(request, hub.settings.gateway, known)
     upload.flag("active", True)
@@ -170,7 +137,7 @@ async def check_gesture(request: Request) -> dict[str, Any]:
     judged = await judge(hub, upload.images, burst=upload.burst)
     confusions: list[dict[str, Any]] = []
     if judged.kept:
-        confusions = await _confusions(hub, name, samples + judged.templates, besides)
+        confusions = await confusions_of(hub, name, samples + judged.templates, besides)
     return {
         "images": judged.images_json(),
         "accepted": len(judged.kept),
@@ -183,7 +150,7 @@ async def check_gesture(request: Request) -> dict[str, Any]:
 @router.get("/gestures/confusions", summary="Which gestures may be taken for one another")
 async def list_confusions(request: Request) -> dict[str, Any]:
     """All gestures against all others, active or not, and what would help."""
-    hub = _hub(request)
+    hub = hub_of(request)
     version = await asyncio.to_thread(lambda: hub.store.version)
     cached: tuple[int, dict[str, Any]] | None = getattr(request.app.state, "confusions", None)
     if cached is not None and cached[0] == version:
@@ -198,56 +165,7 @@ async def list_confusions(request: Request) -> dict[str, Any]:
 @router.get("/gestures/{id}", summary="One gesture", responses={404: {"description": "unknown id"}})
 async def get_gesture(request: Request, id: str) -> dict[str, Any]:
     """One gesture."""
-    return gesture_json(await asyncio.to_thread(_hub(request).store.get, id))
-
-
-@router.patch(
-    "/gestures/{id}",
-    summary="Change a gesture's name or action, or whether it is active",
-    openapi_extra={"requestBody": PATCH_BODY},
-    responses={
-        404: {"description": "unknown id"},
-        409: {"description": "the name is taken"},
-        422: {"description": "a bad name or action"},
-    },
-)
-async def update_gesture(request: Request, id: str) -> dict[str, Any]:
-    """Change what is named: ``{"name": ..., "action": {...}, "active": true}``.
-
-    The answer to ``active`` also says what the gesture may be confused with.
-    """
-    hub = _hub(request)
-    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
-    if kind != "application/json":
-        raise UnsupportedMedia(f"send application/json, not {kind or 'nothing'}", given=kind)
-    body = bytearray()
-    async for part in request.stream():
-        body += part
-        if len(body) > MAX_JSON:
-            raise Invalid(f"the JSON may have {MAX_JSON} bytes", field="body")
-    changes = parse_json(bytes(body), "body")
-    if (
-        not isinstance(changes, dict)
-        or not changes
-        or changes.keys() - {"name", "action", "active"}
-    ):
-        raise Invalid(
-            "send a JSON object with one or more of 'name', 'action' and 'active'", field="body"
-        )
-    name = changes.get("name")
-    if "name" in changes and not isinstance(name, str):
-        raise Invalid("the name must be a string", field="name")
-    active = changes.get("active")
-    if "active" in changes and not isinstance(active, bool):
-        raise Invalid("active must be true or false", field="active")
-    action = parse_action(changes["action"]) if "action" in changes else None
-    gesture = await asyncio.to_thread(hub.store.update, id, name=name, action=action, active=active)
-    await hub.gallery_changed()
-    if active is None:
-        return gesture_json(gesture)
-    templates = [sample.template for sample in gesture.samples]
-    confusions = await _confusions(hub, gesture.name, templates, gesture.id)
-    return {**gesture_json(gesture), "confusions": confusions}
+    return gesture_json(await asyncio.to_thread(hub_of(request).store.get, id))
 
 
 @router.delete(
@@ -258,7 +176,7 @@ async def update_gesture(request: Request, id: str) -> dict[str, Any]:
 )
 async def delete_gesture(request: Request, id: str) -> Response:
     """Forget a gesture and its samples."""
-    hub = _hub(request)
+    hub = hub_of(request)
     await asyncio.to_thread(hub.store.delete, id)
     await hub.gallery_changed()
     return Response(status_code=204)
@@ -277,12 +195,12 @@ async def delete_gesture(request: Request, id: str) -> Response:
 )
 async def add_samples(request: Request, id: str) -> dict[str, Any]:
     """Enrol more images of a gesture: all of them, or none; of a burst the best."""
-    hub = _hub(request)
+    hub = hub_of(request)
     gesture = await asyncio.to_thread(hub.store.get, id)
     upload = await read_enrolment(request, hub.settings.gateway, set())
     judged = await judge_for_enrolment(hub, upload.images, burst=upload.burst)
     templates = [*(sample.template for sample in gesture.samples), *judged.templates]
-    confusions = await _confusions(hub, gesture.name, templates, id)
+    confusions = await confusions_of(hub, gesture.name, templates, id)
     gesture = await asyncio.to_thread(hub.store.add_samples, id, judged.templates)
     await hub.gallery_changed()
     return _enrolled_json(gesture, judged, upload.burst, confusions)
@@ -301,7 +219,7 @@ async def template(
     request: Request, id: str, sample: Annotated[int, Query(ge=0, le=100_000)] = 0
 ) -> Response:
     """The template of sample number ``sample``, counted from 0."""
-    gesture = await asyncio.to_thread(_hub(request).store.get, id)
+    gesture = await asyncio.to_thread(hub_of(request).store.get, id)
     if sample >= len(gesture.samples):
         raise NotFound(
             f"{gesture.name} has {len(gesture.samples)} samples, counted from 0; "
@@ -342,7 +260,7 @@ def _recognise(image: bytes, settings: PipelineSettings, enrolled: Enrolled) -> 
 )
 async def recognise(request: Request) -> dict[str, Any]:
     """An image in (multipart field ``image``, or the body itself), the match out."""
-    hub = _hub(request)
+    hub = hub_of(request)
     image = await read_image(request, hub.settings.gateway.max_upload_bytes)
     if not image:
         raise Invalid("the image is empty", field="image")

@@ -20,7 +20,12 @@ _AWAY: dict[int | str, dict[str, Any]] = {
 }
 
 
-def _robot(request: Request, id: str) -> tuple["Hub", RobotPort]:
+def robot_of(request: Request, id: str) -> tuple["Hub", RobotPort]:
+    """The robot ``id``, and what the routes share.
+
+    Raises:
+        NotFound: there is no such robot.
+    """
     hub: Hub = request.app.state.hub
     if id != hub.robot.id:
         raise NotFound(f"there is no robot {id[:40]!r}; there is {hub.robot.id!r}", id=id[:40])
@@ -37,13 +42,13 @@ async def list_robots(request: Request) -> list[dict[str, Any]]:
 @router.get("/{id}", summary="One robot", responses=_UNKNOWN)
 async def get_robot(request: Request, id: str) -> dict[str, Any]:
     """What the robot is, and its newest state in full."""
-    return robot_detail(_robot(request, id)[1])
+    return robot_detail(robot_of(request, id)[1])
 
 
 @router.post("/{id}/stop", summary="Stop (category S1, latched)", responses=_AWAY)
 async def stop_robot(request: Request, id: str) -> dict[str, Any]:
     """Stop the robot; whoever drives. Answers once the robot has confirmed it."""
-    hub, robot = _robot(request, id)
+    hub, robot = robot_of(request, id)
     hub.metrics.stops.labels("rest").inc()
     await hub.stop("rest", "a stop was asked for over REST")
     return robot_summary(robot)
@@ -56,7 +61,7 @@ async def stop_robot(request: Request, id: str) -> dict[str, Any]:
 )
 async def reset_robot(request: Request, id: str) -> dict[str, Any]:
     """Leave the latched stop. The robot is disarmed afterwards."""
-    hub, robot = _robot(request, id)
+    hub, robot = robot_of(request, id)
     await hub.reset("rest")
     return robot_summary(robot)
 
@@ -71,6 +76,6 @@ async def reset_scene(request: Request, id: str) -> dict[str, Any]:
 
     Needs no control, but a robot that is disarmed or stopped, and stands.
     """
-    hub, robot = _robot(request, id)
+    hub, robot = robot_of(request, id)
     await hub.reset_scene("rest")
     return robot_summary(robot)

@@ -17,12 +17,23 @@ from app.config import Settings
 from app.errors import CannotStart, FarhandError, LinkFailed, RobotUnavailable
 from app.gateway.node_process import NodeProcess, node_command
 from app.link.gateway_end import GatewayEnd, OnPicture
-from app.link.messages import Command, Description, LeaseReply, LeaseRequest, State, StopRequest
+from app.link.messages import (
+    Command,
+    Description,
+    DryRunReport,
+    DryRunRequest,
+    LeaseReply,
+    LeaseRequest,
+    State,
+    StopRequest,
+)
 from app.link.session import socket_endpoint
 
 log = logging.getLogger(__name__)
 
 TEND_S = 0.2
+DRY_RUN_S = 30.0
+"""A check breaks off after 12 s by itself; on a slow machine its arm has to be made first."""
 RESEND_S = 0.1
 """A stop that is not confirmed is sent again this often."""
 
@@ -218,6 +229,20 @@ class RobotPort:
                 f"the robot cannot be asked: {self.fault or 'it does not answer'}", robot=self.id
             )
         return link.ask(request, timeout=self._ask_timeout_s)
+
+    def dry_run(self, request: DryRunRequest) -> DryRunReport:
+        """Ask what an action would do, and wait for the answer; nothing moves.
+
+        Raises:
+            RobotUnavailable: no answer came in time.
+        """
+        link = self._link
+        if link is None or not self.online:
+            raise RobotUnavailable(
+                f"nothing can be checked: {self.fault or 'the robot does not answer'}",
+                robot=self.id,
+            )
+        return link.dry_run(request, timeout=DRY_RUN_S)
 
     def watch_camera(self, name: str, callback: OnPicture) -> Watch:
         """Have ``callback`` called, on a thread of the link, with each picture of a camera.

@@ -18,6 +18,8 @@ NAME_MAX = 60
 MAX_GESTURES = 500
 MAX_SAMPLES = 1000
 """Samples of one gesture."""
+MAX_VERSIONS = 100
+"""Actions of one gesture that are kept; the oldest are forgotten."""
 
 _JOINERS = "\u200c\u200d"
 """Not printable by Unicode's book, but part of Persian words and of many emoji."""
@@ -48,6 +50,18 @@ class Gesture:
     """UTC, in steps of a millisecond."""
     active: bool = True
     """Whether it is matched. An inactive gesture is kept and listed, and moves nothing."""
+    version: int = 1
+    """Of the action: rises with each change of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class ActionVersion:
+    """An action that a gesture has or had."""
+
+    version: int
+    action: Action
+    created: datetime
+    """UTC, in steps of a millisecond."""
 
 
 def clean_name(name: str) -> str:

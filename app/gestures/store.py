@@ -22,6 +22,7 @@ from app.gestures.records import (
     MAX_GESTURES,
     MAX_SAMPLES,
     TEMPLATE_BYTES,
+    ActionVersion,
     Gesture,
     NewGesture,
     Sample,
@@ -31,6 +32,7 @@ from app.gestures.records import (
 )
 from app.gestures.setfile import read_set
 from app.gestures.tables import GalleryRow, GestureRow, SampleRow
+from app.gestures.versions import check_version, set_action, version_of
 from app.link.actions import ACTION, Action
 
 log = logging.getLogger(__name__)
@@ -167,24 +169,65 @@ class GestureStore:
         name: str | None = None,
         action: Action | None = None,
         active: bool | None = None,
+        version: int | None = None,
     ) -> Gesture:
         """Change a gesture's name, its action, or whether it is matched; None leaves it.
 
+        The action that was there before is kept, see :meth:`versions`.
+
+        Args:
+            id: The gesture.
+            name: As in :meth:`create`.
+            action: As in :meth:`create`.
+            active: Whether it is matched from now on.
+            version: What the caller takes for the newest version of the action; nothing is changed
+                when it is not.
+
         Raises:
             NotFound: no gesture has this id.
+            ChangedMeanwhile: ``version`` is not the newest.
             Invalid, Duplicate: as in :meth:`create`.
         """
         clean = None if name is None else clean_name(name)
         with self._write() as session:
             row = self._row(session, id)
+            check_version(row, version)
             if clean is not None:
                 self._check_free(session, clean, besides=row.number)
                 row.name, row.name_key = clean, name_key(clean)
             if action is not None:
-                row.action = ACTION.dump_json(action).decode()
+                set_action(row, action, _now_ms())
             if active is not None:
                 row.active = active
             return self._touch(session, row)
+
+    def versions(self, id: str) -> builtins.list[ActionVersion]:
+        """The actions that a gesture had, oldest first; the last is in force.
+
+        Raises:
+            NotFound: no gesture has this id.
+        """
+        with self._read() as session:
+            row = self._row(session, id)
+            return [self._version(row, number) for number in range(len(row.versions))]
+
+    def restore(self, id: str, version: int) -> Gesture:
+        """Give a gesture the action that it had as ``version``, as its newest version.
+
+        Raises:
+            NotFound: no gesture has this id, or it has no such version.
+        """
+        with self._write() as session:
+            row = self._row(session, id)
+            for number, former in enumerate(row.versions):
+                if former.version == version:
+                    set_action(row, self._version(row, number).action, _now_ms())
+                    return self._touch(session, row)
+            raise NotFound(
+                f"{row.name} has no version {version} of its action; the newest is {row.version}",
+                version=version,
+                newest=row.version,
+            )
 
     def add_samples(self, id: str, templates: Sequence[bytes]) -> Gesture:
         """Enrol more pictures of a gesture.
@@ -221,12 +264,14 @@ class GestureStore:
                 select(GestureRow).where(GestureRow.name_key == name_key(entry.name))
             )
             if row is None:
-                row = GestureRow(id=uuid.uuid4().hex, created_ms=now, samples=[])
+                row = GestureRow(
+                    id=uuid.uuid4().hex, created_ms=now, version=0, samples=[], versions=[]
+                )
                 session.add(row)
             elif not replace:
                 self._check_free(session, entry.name)
             row.name, row.name_key = entry.name, name_key(entry.name)
-            row.action = ACTION.dump_json(entry.action).decode()
+            set_action(row, entry.action, now)
             row.active = entry.active
             row.samples.clear()
             self._append(row, entry.templates)
@@ -277,6 +322,19 @@ class GestureStore:
             raise NotFound(f"there is no gesture with the id {id[:64]!r}", id=id[:64])
         return row
 
+    def _version(self, row: GestureRow, number: int) -> ActionVersion:
+        try:
+            found = version_of(row.versions[number])
+        except ValueError as error:
+            raise self._damaged(row) from error
+        return ActionVersion(found.version, found.action, _time(found.created_ms))
+
+    def _damaged(self, row: GestureRow) -> DatabaseBroken:
+        return DatabaseBroken(
+            f"{database.describe(self._engine)} is damaged (gesture {row.name!r}: its content "
+            f"has changed on the disk); {database.GO_ON}"
+        )
+
     def _record(self, row: GestureRow) -> Gesture:
         sound = row.checksum == _gesture_checksum(row) and all(
             sample.checksum == _sample_checksum(sample) and len(sample.template) == TEMPLATE_BYTES
@@ -287,16 +345,13 @@ class GestureStore:
                 raise ValueError("wrong checksum")
             action = ACTION.validate_json(row.action)
         except (ValidationError, ValueError) as error:
-            raise DatabaseBroken(
-                f"{database.describe(self._engine)} is damaged (gesture {row.name!r}: its content "
-                f"has changed on the disk); {database.GO_ON}"
-            ) from error
+            raise self._damaged(row) from error
         samples = tuple(
             Sample(sample.id, bytes(sample.template), _time(sample.created_ms))
             for sample in row.samples
         )
         created, updated = _time(row.created_ms), _time(row.updated_ms)
-        return Gesture(row.id, row.name, action, samples, created, updated, row.active)
+        return Gesture(row.id, row.name, action, samples, created, updated, row.active, row.version)
 
     # -- transactions --------------------------------------------------------------------------
 
@@ -329,9 +384,10 @@ def _time(ms: int) -> datetime:
 
 def _gesture_checksum(row: GestureRow) -> int:
     fields = (row.id, row.name, row.name_key, row.action, row.created_ms, row.updated_ms)
-    # Added only where it says something: rows older than the column keep their checksums.
+    # Added only where they say something: rows older than the columns keep their checksums.
     state = () if row.active else ("inactive",)
-    return zlib.crc32(repr(fields + state).encode())
+    version = () if row.version == 1 else (row.version,)
+    return zlib.crc32(repr(fields + state + version).encode())
 
 
 def _sample_checksum(row: SampleRow) -> int:

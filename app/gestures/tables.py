@@ -1,6 +1,16 @@
 """The gesture database's tables. A change here needs a new script in ``migrations/versions``."""
 
-from sqlalchemy import BigInteger, Boolean, ForeignKey, Integer, LargeBinary, String, Text, true
+from sqlalchemy import (
+    BigInteger,
+    Boolean,
+    ForeignKey,
+    Integer,
+    LargeBinary,
+    String,
+    Text,
+    UniqueConstraint,
+    true,
+)
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
 
 
@@ -24,11 +34,33 @@ class GestureRow(Base):
     updated_ms: Mapped[int] = mapped_column(BigInteger)
     active: Mapped[bool] = mapped_column(Boolean, server_default=true())
     """Whether it is matched."""
+    version: Mapped[int] = mapped_column(Integer, server_default="1")
+    """Of the action: rises with each change of it."""
     checksum: Mapped[int] = mapped_column(BigInteger)
     """CRC-32 of the other columns: a damaged action must never move a robot."""
     samples: Mapped[list["SampleRow"]] = relationship(
         order_by="SampleRow.number", cascade="all, delete-orphan", passive_deletes=True
     )
+    versions: Mapped[list["ActionVersionRow"]] = relationship(
+        order_by="ActionVersionRow.version", cascade="all, delete-orphan", passive_deletes=True
+    )
+    """The newest is the action in force."""
+
+
+class ActionVersionRow(Base):
+    """One action that a gesture has or had."""
+
+    __tablename__ = "action_versions"
+    __table_args__ = (UniqueConstraint("gesture", "version"),)
+
+    number: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=True)
+    gesture: Mapped[int] = mapped_column(ForeignKey("gesture.number", ondelete="CASCADE"))
+    version: Mapped[int] = mapped_column(Integer)
+    action: Mapped[str] = mapped_column(Text)
+    """JSON of :data:`app.link.actions.Action`."""
+    created_ms: Mapped[int] = mapped_column(BigInteger)
+    checksum: Mapped[int] = mapped_column(BigInteger)
+    """CRC-32 of the version, the action and the time."""
 
 
 class SampleRow(Base):

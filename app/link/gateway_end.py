@@ -14,6 +14,8 @@ from app.link.header import HEADER_SIZE, FrameHeader
 from app.link.messages import (
     Command,
     Description,
+    DryRunReport,
+    DryRunRequest,
     LeaseReply,
     LeaseRequest,
     Message,
@@ -199,6 +201,14 @@ class GatewayEnd:
         """
         return self._ask("description", Description, b"", timeout)
 
+    def dry_run(self, request: DryRunRequest, timeout: float = 30.0) -> DryRunReport:
+        """Ask what an action would do; nothing moves. Blocks up to ``timeout`` s.
+
+        Raises:
+            RobotUnavailable: nobody answered in time.
+        """
+        return self._ask("dry_run", DryRunReport, request.encode(), timeout)
+
     def watch_camera(self, name: str, on_picture: OnPicture) -> CameraWatch:
         """Call ``on_picture(header, jpeg)`` with each picture, the newest only, on its own thread.
 
@@ -256,9 +266,9 @@ class GatewayEnd:
                     self.invalid[kind.__name__.lower()] += 1
         except zenoh.ZError as error:
             log.debug("%s: %s", what, error)
-        raise RobotUnavailable(
-            f"the robot node {self.robot!r} did not answer within {timeout:g} s", robot=self.robot
-        )
+        silent = time.monotonic() >= deadline
+        what = f"did not answer within {timeout:g} s" if silent else "cannot answer that yet"
+        raise RobotUnavailable(f"the robot node {self.robot!r} {what}", robot=self.robot)
 
     def _take_state(self, payload: bytes) -> None:
         state = decode(State, payload)

@@ -244,3 +244,47 @@ class Description(Message):
     workspace: WorkspaceDescription | None = None
     cameras: tuple[CameraDescription, ...]
     objects: tuple[ObjectDescription, ...] = ()
+
+
+class DryRunRequest(Message):
+    """Would this action break a limit? Key ``/dry_run``; answered by a process beside the node."""
+
+    action: Action
+    start: str = Field(
+        default="current",
+        max_length=40,
+        description="where the arm begins: ``current``, ``home``, or the name of a pose",
+    )
+
+
+class DryRunProblem(Message):
+    """One limit that the action meets."""
+
+    step: int | None = Field(description="of a sequence, counted from 1")
+    time_s: float = Field(description="s from the beginning")
+    kind: str = Field(
+        description="such as joint_limit; slowed means that the arm does all that is asked, but "
+        "for a while more slowly"
+    )
+    message: str
+
+
+class DryRunPath(Message):
+    """Where the arm would go, thinned: three lists of one length."""
+
+    times: tuple[float, ...] = Field(default=(), description="s")
+    joints: tuple[tuple[float, ...], ...] = Field(default=(), description="rad")
+    tool: tuple[tuple[float, float, float], ...] = Field(
+        default=(), description="m, base frame; the tool centre point"
+    )
+
+
+class DryRunReport(Message):
+    """The answer to a DryRunRequest. Nothing has moved."""
+
+    code: str = Field(default="ok", description="``ok``: checked; otherwise why not, as a word")
+    reason: str = Field(default="", description="why it was not checked, in plain words")
+    ok: bool = Field(default=False, description="no problem but ``slowed``")
+    duration_s: float = 0.0
+    problems: tuple[DryRunProblem, ...] = ()
+    path: DryRunPath = DryRunPath()

@@ -139,8 +139,12 @@ class Arm(Protocol):
         """Set where the joints should be (rad) and how fast they should pass there (rad/s)."""
         ...
 
-    def grip(self, width: float) -> None:
-        """Open or close the fingers towards ``width`` (m) at the gripper's own speed and force."""
+    def grip(self, width: float, force: float | None = None) -> None:
+        """Open or close the fingers towards ``width`` (m) at the gripper's own speed.
+
+        They press with ``force`` (N, each finger), the gripper's own unless given, and at most
+        that.
+        """
         ...
 
     def brake(self, engaged: bool) -> None:

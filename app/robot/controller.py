@@ -146,7 +146,10 @@ class Controller:
             if self._hold is not None and self.motion.busy:
                 self.safety.hold("no command in time: the picture or the link failed")
         self._settle()
+        doing = self.motion.doing
         self.motion.step(self.reading)
+        if doing and not self.motion.doing and self.motion.gave_up is not None:
+            self._note = self.motion.gave_up
         if self.motion.wants_stop:
             self.motion.wants_stop = False
             self.stop(StopRequest(source="sequence", reason="the sequence says stop"))

@@ -127,7 +127,11 @@ def run_node(settings: NodeSettings, arm: Arm | None = None) -> None:
 
         arm = SimulatedArm(settings.model, settings.id)
     node = Node(settings, arm, NodeEnd(settings.id, settings.endpoint))
-    camera = Child(camera_command(settings), "camera process") if settings.cameras else None
+    children = []
+    if settings.cameras:
+        children.append(Child(camera_command(settings), "camera process"))
+    if settings.dry_runs:
+        children.append(Child(dry_run_command(settings), "dry-run process"))
     before = {
         number: signal.signal(number, lambda *_: node.end("asked to end"))
         for number in (signal.SIGTERM, signal.SIGINT)
@@ -142,17 +146,27 @@ def run_node(settings: NodeSettings, arm: Arm | None = None) -> None:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-        if camera is not None:
-            camera.close()
+        for child in children:
+            child.close()
         node.close()
 
 
 def camera_command(settings: NodeSettings) -> list[str]:
     """The command line of the camera process."""
+    return _beside("app.robot.camera", settings)
+
+
+def dry_run_command(settings: NodeSettings) -> list[str]:
+    """The command line of the dry-run process."""
+    motion = settings.motion.model_dump_json()
+    return [*_beside("app.robot.dry_run", settings), "--motion", motion]
+
+
+def _beside(module: str, settings: NodeSettings) -> list[str]:
     return [
         sys.executable,
         "-m",
-        "app.robot.camera",
+        module,
         "--robot",
         settings.id,
         "--endpoint",
@@ -170,6 +184,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--endpoint", required=True, help="unixsock-stream/PATH to listen on")
     parser.add_argument("--latch", type=Path, help="file that keeps a latched stop")
     parser.add_argument("--no-cameras", action="store_true", help="start no camera process")
+    parser.add_argument("--no-dry-runs", action="store_true", help="start no dry-run process")
     parser.add_argument(
         "--parent", type=int, help="process id of the one that starts it; end when that is gone"
     )
@@ -184,6 +199,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             endpoint=given.endpoint,
             latch=given.latch,
             cameras=not given.no_cameras,
+            dry_runs=not given.no_dry_runs,
             parent=given.parent,
         )
         run_node(settings)

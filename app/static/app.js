@@ -339,6 +339,9 @@ async function teach(gesture = null) {
             update: api.updateGesture,
             addSamples: api.addSamples,
             remove: api.deleteGesture,
+            versions: api.versions,
+            restore: api.restoreVersion,
+            check: (action, from) => api.dryRun(robotId(), action, from),
         },
         done(text) {
             sheets.close();

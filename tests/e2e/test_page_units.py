@@ -101,6 +101,30 @@ def test_pictures_are_unpacked_and_nonsense_is_not(modules: Page) -> None:
         ({"type": "gripper", "width": 0.0}, "close gripper"),
         ({"type": "gripper", "width": 0.08}, "open gripper"),
         ({"type": "gripper", "width": 0.04}, "gripper to 40 mm"),
+        ({"type": "gripper", "width": 0.0, "force": 12.0}, "close gripper with 12 N"),
+        (
+            {"type": "move_linear", "offset": [0.05, 0, -0.1], "rotation": [0, 0, 0.5235987756]},
+            "forward by 5 cm, down by 10 cm, turn about z by 30°",
+        ),
+        (
+            {"type": "move_linear", "frame": "tool", "offset": [0, 0, 0.02]},
+            "along tool z by 2 cm",
+        ),
+        ({"type": "move_linear"}, "stand still"),
+        (
+            {
+                "type": "sequence",
+                "steps": [
+                    {
+                        "type": "repeat",
+                        "times": 3,
+                        "steps": [{"type": "wait", "duration": 2}, {"type": "home"}],
+                    },
+                    {"type": "stop"},
+                ],
+            },
+            "3 times: wait 2 s, then 1 step, then 1 step",
+        ),
         ({"type": "home"}, "go home"),
         ({"type": "stop"}, "stop the robot"),
         (
@@ -129,6 +153,24 @@ def test_actions_in_plain_words(modules: Page, action: dict[str, Any], words: st
         {"type": "turn_joint", "joint": 3, "angle": -0.7},
         {"type": "pose", "name": "ready"},
         {"type": "gripper", "width": 0.03},
+        {"type": "gripper", "width": 0.0, "force": 12.5},
+        {"type": "move_linear", "offset": [0.05, 0, -0.1], "rotation": [0, 0.3, 0.5]},
+        {"type": "move_linear", "frame": "tool", "offset": [0, 0, 0.02], "speed": 0.05},
+        {"type": "move_linear", "rotation": [0, 0, 1]},
+        {
+            "type": "sequence",
+            "steps": [
+                {"type": "wait", "duration": 2.5},
+                {
+                    "type": "repeat",
+                    "times": 4,
+                    "steps": [
+                        {"type": "wait", "duration": 0.5},
+                        {"type": "jog_cartesian", "linear": [0, 0, 0.1], "duration": 1},
+                    ],
+                },
+            ],
+        },
         {"type": "home"},
         {"type": "stop"},
         {
@@ -157,6 +199,42 @@ def _rounded(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_rounded(item) for item in value]
     return value
+
+
+@pytest.mark.parametrize(
+    ("ok", "problems", "title", "lines"),
+    [
+        (True, [], "Nothing is in the way. It takes 12.5 s.", []),
+        (
+            True,
+            [(None, "slowed", "slowed near a singular position")],
+            "It can be done, slowed down in places. It takes 12.5 s.",
+            ["Slowed near a singular position (after 3 s)"],
+        ),
+        (
+            False,
+            [(2, "joint_limit", "joint 5 would pass its limit"), (3, "slowed", "slowed")],
+            "It meets a limit:",
+            ["Step 2: Joint 5 would pass its limit (after 3 s)", "Step 3: Slowed (after 3 s)"],
+        ),
+    ],
+)
+def test_what_a_dry_run_found_in_plain_words(
+    modules: Page,
+    ok: bool,
+    problems: list[tuple[int | None, str, str]],
+    title: str,
+    lines: list[str],
+) -> None:
+    found = [
+        {"step": step, "time_s": 3.0, "kind": kind, "message": message}
+        for step, kind, message in problems
+    ]
+    report = {"ok": ok, "duration_s": 12.5, "problems": found, "path": {}}
+    said = run(modules, "ui/program-check.js", "return m.describeReport(a)", report)
+    assert said["good"] is ok
+    assert said["title"] == title
+    assert [line["text"] for line in said["lines"]] == lines
 
 
 def test_every_icon_and_text_that_is_named_exists() -> None:

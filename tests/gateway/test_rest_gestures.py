@@ -134,7 +134,7 @@ BAD_ACTIONS: dict[str, Any] = {
     "a list": [],
     "no type": {},
     "unknown type": {"type": "dance"},
-    "joint 7": {"type": "jog_joint", "joint": 7, "velocity": 0.1},
+    "joint 17": {"type": "jog_joint", "joint": 17, "velocity": 0.1},
     "too fast": {"type": "jog_joint", "joint": 1, "velocity": 100},
     "unknown field": {"type": "home", "now": True},
     "two numbers": {"type": "jog_cartesian", "linear": [1, 2]},

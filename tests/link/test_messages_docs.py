@@ -10,6 +10,8 @@ TEXT = (Path(__file__).parents[2] / "docs" / "protocol.md").read_text()
 PARTS = {
     "ObjectState",
     "LoopState",
+    "DryRunProblem",
+    "DryRunPath",
     "Clearance",
     "Transition",
     "JointDescription",
@@ -29,7 +31,8 @@ def test_every_message_is_documented(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "what", ["command", "state", "camera/{name}", "stop", "lease", "description", "alive"]
+    "what",
+    ["command", "state", "camera/{name}", "stop", "lease", "description", "dry_run", "alive"],
 )
 def test_every_key_is_documented(what: str) -> None:
     assert f"`{messages.key('{robot}', what)}`" in TEXT

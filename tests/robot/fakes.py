@@ -29,6 +29,7 @@ class FakeArm:
         self.objects: tuple[ObjectState, ...] = ()
         self.held: str | None = None
         self.contacts: tuple[Contact, ...] = ()
+        self.force: float | None = None
         self.blocked_at: float | None = None
         """m; a thing between the fingers."""
         self.stuck = False
@@ -66,8 +67,8 @@ class FakeArm:
         if not self.braked and not self.stuck:
             self.joints, self.velocities = joints.copy(), velocities.copy()
 
-    def grip(self, width: float) -> None:
-        self.wanted_width = width
+    def grip(self, width: float, force: float | None = None) -> None:
+        self.wanted_width, self.force = width, force
 
     def brake(self, engaged: bool) -> None:
         self.braked = engaged

@@ -18,7 +18,7 @@ from app.link.header import HEADER_SIZE, FrameHeader
 from app.link.messages import State, key
 from app.link.session import open_session, socket_endpoint
 from app.robot import camera
-from app.robot.camera import NewestState
+from app.robot.beside import LINK_PATIENCE_S, NewestState
 from app.robot.models import load_model
 
 ROOT = Path(__file__).parents[2]
@@ -261,7 +261,7 @@ def test_ends_when_the_link_is_gone(endpoint: str) -> None:
     try:
         wait_for(lambda: session.info.peers_zid() or list(session.info.transports()))
         session.close()
-        assert process.wait(camera.LINK_PATIENCE_S + 15) == 0
+        assert process.wait(LINK_PATIENCE_S + 15) == 0
     finally:
         process.kill()
         process.wait()

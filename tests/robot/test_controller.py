@@ -3,7 +3,20 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from app.link.actions import Action, Gripper, Home, JogCartesian, JogJoint, Pose, Stop, TurnJoint
+from app.link.actions import (
+    Action,
+    Gripper,
+    Home,
+    JogCartesian,
+    JogJoint,
+    MoveLinear,
+    Pose,
+    Repeat,
+    Sequence,
+    Stop,
+    TurnJoint,
+    Wait,
+)
 from app.link.messages import Doubt, State, StopRequest
 from app.robot.controller import DOUBTS, DT, tick_of
 from app.robot.latch import StopLatch
@@ -28,6 +41,51 @@ def test_a_jog_runs_while_it_is_held_and_ends_smoothly() -> None:
     operator.show(None, 1, 0.5)
     assert (operator.state.mode, operator.state.stop) == ("armed", None)
     assert not operator.arm.velocities.any()
+
+
+LINE = MoveLinear(offset=(0.0, 0.3, 0.0), speed=0.5)
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        LINE,
+        Sequence(steps=(Repeat(times=9, steps=(LINE, TurnJoint(joint=1, angle=-0.3))),)),
+        Sequence(steps=(Wait(duration=0.1), LINE, Wait(duration=1.0), Home())),
+    ],
+    ids=["line", "repeat", "wait"],
+)
+@pytest.mark.parametrize("silent", [False, True])
+def test_every_kind_of_program_stops_when_its_gesture_is_let_go_or_not_heard_of(
+    action: Action, silent: bool
+) -> None:
+    operator = Operator().ready()
+    operator.show(action, 1, 0.6)
+    assert operator.state.mode == "moving"
+    assert operator.arm.velocities.any()
+    if silent:
+        assert operator.standstill_after() <= 0.46
+        assert operator.state.stop == "S2"
+    else:
+        operator.show(None, 1, 0.5)
+        assert (operator.state.mode, operator.state.stop) == ("armed", None)
+    there = operator.arm.joints
+    operator.wait(1.0)
+    assert (operator.arm.joints == there).all()
+
+
+def test_what_gives_up_says_why_while_its_gesture_is_held() -> None:
+    operator = Operator().ready()
+    operator.show(MoveLinear(offset=(1.0, 0.0, 0.0)), 1, 0.5)
+    state = operator.state
+    assert (state.mode, state.armed, state.stop) == ("armed", True, None)
+    assert state.reason is not None
+    assert state.reason.startswith("only 32.0 cm of 100.0 cm can be reached in a straight line")
+    assert State.model_validate_json(state.encode()) == state
+    operator.show(None, 1, 0.2)
+    assert operator.state.reason is None
+    operator.show(LINE, 2, 0.2)
+    assert (operator.state.mode, operator.state.reason) == ("moving", None)
 
 
 @pytest.mark.parametrize(("joint", "velocity"), [(1, 4.3), (2, -4.3), (4, 4.3), (6, 4.3)])

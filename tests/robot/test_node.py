@@ -108,7 +108,7 @@ class NodeProcess:
     def __init__(self, *more: str) -> None:
         self.folder = Path(tempfile.mkdtemp(prefix="fh-"))
         self.endpoint = socket_endpoint(self.folder / "n.sock")
-        self.more = [*more, "--latch", str(self.folder / "latch"), "--no-cameras"]
+        self.more = [*more, "--latch", str(self.folder / "latch"), "--no-cameras", "--no-dry-runs"]
         self.start()
 
     def start(self) -> None:

@@ -27,6 +27,7 @@ from ruckig import ControlInterface, InputParameter, Result, Ruckig, Trajectory
 from app.config import ArmMotionSettings
 from app.link.actions import JogCartesian
 from app.robot.arm import Kinematics, Reading, Vector
+from app.robot.motion.at_work import AtWork
 from app.robot.motion.limits import Limits
 from app.robot.motion.rotation import difference, rotate, turn
 from app.robot.motion.trajectory import JointTrajectory
@@ -38,7 +39,7 @@ _DAMPING = 0.04
 _DAMPED_BELOW = 0.05
 """w0 above."""
 _LOOK_AHEAD_S = 0.2
-_BLOCKED = 0.02
+BLOCKED = 0.02
 """Part of the twist that damping may lose before the way counts as closed."""
 _SLOWEST = 0.15
 """Near a singularity the tool keeps at least this part of its speed, so that it can leave."""
@@ -46,11 +47,14 @@ _MARGIN = 0.8
 """Part of a joint's ordinary acceleration that is planned with; the rest is for curvature."""
 
 
-_KEEP_OFF = 0.005
+KEEP_OFF = 0.005
 """rad; straight motion ends this far from a joint's limit."""
+TOO_NEAR_SINGULAR = AtWork(
+    "the arm cannot move that way from here: too near a singular position", "singularity"
+)
 
 
-class _Ramp(NamedTuple):
+class Ramp(NamedTuple):
     """How fast the pace may change."""
 
     acceleration: float
@@ -88,7 +92,9 @@ class CartesianJog:
         )
         self._linear, self._angular = part * linear, part * angular
         self._clipped = (
-            (f"the tool moves at {100 * part:.0f}% of the speed asked for",) if part < 1 else ()
+            (AtWork(f"the tool moves at {100 * part:.0f}% of the speed asked for", "speed"),)
+            if part < 1
+            else ()
         )
         self._left = action.duration
         self._creeps_for = settings.creep_s if action.duration is None else 0.0
@@ -198,7 +204,7 @@ class CartesianJog:
         return vt.T @ ((values / (values**2 + damping)) * (u.T @ twist)), least
 
     def _allowed(
-        self, trajectory: JointTrajectory, now: Vector, ramp: _Ramp
+        self, trajectory: JointTrajectory, now: Vector, ramp: Ramp
     ) -> tuple[float, tuple[str, ...]]:
         """The part of the speed that limits and singularities leave, and what takes the rest."""
         wanted = self._wanted()
@@ -210,26 +216,28 @@ class CartesianJog:
         there = self._kinematics.jacobian(ahead)
         then, least = self._solve(there, wanted)
         lost = float(np.linalg.norm(there @ then - wanted)) / size
-        if lost > _BLOCKED:
-            return 0.0, ("the arm cannot move that way from here: too near a singular position",)
+        if lost > BLOCKED:
+            return 0.0, (TOO_NEAR_SINGULAR,)
         part, reasons = 1.0, []
         if least < self._settings.slow_below:
             part = max(_SLOWEST, least / self._settings.slow_below)
-            reasons.append("slowed near a singular position")
+            reasons.append(AtWork("slowed near a singular position", "slowed"))
         fastest = np.maximum(np.abs(now), np.abs(then)) + 1e-12
         by_speed = float((self._limits.ordinary.velocity / fastest).min()) * 0.95
         if by_speed < part:
             part = by_speed
-            reasons.append("slowed by a joint's speed limit")
+            reasons.append(AtWork("slowed by a joint's speed limit", "slowed"))
         by_room = self._room(trajectory, now, ramp)
         if by_room < part:
             part = by_room
             reasons.append(
-                "slowed before a joint's limit" if part > 0 else "a joint is at its limit"
+                AtWork("slowed before a joint's limit", "slowed")
+                if part > 0
+                else AtWork("a joint is at its limit", "joint_limit")
             )
         return part, tuple(reasons)
 
-    def _room(self, trajectory: JointTrajectory, velocity: Vector, ramp: _Ramp) -> float:
+    def _room(self, trajectory: JointTrajectory, velocity: Vector, ramp: Ramp) -> float:
         """The pace from which the tool can still brake along its line before a joint's limit.
 
         With ``r`` the time to the nearest limit at full pace: the pace ``s`` of which
@@ -241,7 +249,7 @@ class CartesianJog:
             limits.upper - trajectory.position,
             trajectory.position - limits.lower,
         )
-        room = np.maximum(room - _KEEP_OFF, 0.0)
+        room = np.maximum(room - KEEP_OFF, 0.0)
         moving = np.abs(velocity) > 1e-6
         if not moving.any():
             return 1.0
@@ -250,10 +258,12 @@ class CartesianJog:
         lag = a * a / (2 * ramp.jerk)
         return min(1.0, math.sqrt(lag * lag + 2 * a * time) - lag)
 
-    def _ramp(self, velocity: Vector) -> _Ramp:
+    def _ramp(self, velocity: Vector) -> Ramp:
         """How fast the pace may change, given the joint velocities at full pace."""
+        return self._ramp_for(self._wanted(), velocity)
+
+    def _ramp_for(self, wanted: Vector, velocity: Vector) -> Ramp:
         settings, ordinary = self._settings, self._limits.ordinary
-        wanted = self._wanted()
         joints = np.abs(velocity) + 1e-9
         acceleration = min(
             _part(settings.linear_acceleration, float(np.linalg.norm(wanted[:3]))),
@@ -263,9 +273,9 @@ class CartesianJog:
         jerk = min(
             acceleration / settings.ramp_jerk_s, _MARGIN * float((ordinary.jerk / joints).min())
         )
-        return _Ramp(acceleration, jerk)
+        return Ramp(acceleration, jerk)
 
-    def _advance(self, target: float, ramp: _Ramp, dt: float) -> None:
+    def _advance(self, target: float, ramp: Ramp, dt: float) -> None:
         """Move the pace towards ``target``."""
         given = self._input
         given.current_position = [0.0]

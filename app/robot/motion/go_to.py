@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from app.robot.arm import Reading, Vector
+from app.robot.motion.at_work import AtWork
 from app.robot.motion.line import JointLine
 from app.robot.motion.planner import Search
 from app.robot.motion.task import Refused
@@ -81,14 +82,16 @@ class GoClear:
             self._search = self._begin(trajectory.position.copy(), self._target)
         self._left -= trajectory.dt
         if self._left <= 0:
-            raise Refused(f"found no way to {self._name} that keeps clear of things")
+            text = f"found no way to {self._name} that keeps clear of things"
+            raise Refused(AtWork(text, "unreachable"))
         try:
             for _ in range(_LOOKS):
                 next(self._search)
         except StopIteration as ended:
             if ended.value is None:
-                raise Refused(f"{self._name} is too near to something now") from None
+                text = f"{self._name} is too near to something now"
+                raise Refused(AtWork(text, "collision")) from None
             self._way = ended.value
-            self.limits = ("goes round things",) if len(self._way) > 1 else ()
+            self.limits = (AtWork("goes round things", "note"),) if len(self._way) > 1 else ()
         else:
-            self.limits = ("looking for a way that keeps clear of things",)
+            self.limits = (AtWork("looking for a way that keeps clear of things", "note"),)

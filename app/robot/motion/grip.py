@@ -19,14 +19,20 @@ class Grip:
 
     Args:
         width: m between the fingers.
+        force: N of each finger; None: the gripper's own.
         grip: The arm's own ``grip``.
         limits: What was clipped, in plain words.
     """
 
     def __init__(
-        self, width: float, grip: Callable[[float], None], limits: tuple[str, ...] = ()
+        self,
+        width: float,
+        force: float | None,
+        grip: Callable[[float, float | None], None],
+        limits: tuple[str, ...] = (),
     ) -> None:
         self._width = width
+        self._force = force
         self._grip = grip
         self._time = 0.0
         self._still = 0.0
@@ -36,7 +42,7 @@ class Grip:
     def step(self, trajectory: JointTrajectory, reading: Reading) -> bool:
         """Keep the fingers going."""
         if self._last is None:
-            self._grip(self._width)
+            self._grip(self._width, self._force)
             self._last = reading.gripper
         moved = abs(reading.gripper - self._last)
         self._still = self._still + trajectory.dt if moved < _STILL_SPEED * trajectory.dt else 0.0

@@ -26,6 +26,7 @@ import numpy as np
 from app.config import ClearanceSettings
 from app.link.messages import Clearance, WorkspaceDescription
 from app.robot.arm import Kinematics, NearKind, Proximity, Reading, Vector
+from app.robot.motion.at_work import AtWork, LimitKind
 from app.robot.motion.trajectory import JointTrajectory
 
 _LEEWAY = 1e-4
@@ -194,7 +195,7 @@ class Guard:
                 return False
         part = max(part, self._settings.slowest)
         self.scale = min(part, self.scale + _RISE * trajectory.dt)
-        self.limits = (why,) if why else ()
+        self.limits = (AtWork(why, "slowed"),) if why else ()
         self._accept(trajectory.position, here, clearance)
         return True
 
@@ -264,7 +265,8 @@ class Guard:
     def _too_near(self, margins: list[Margin]) -> bool:
         for margin in margins:
             if margin.distance < self._needed(margin):
-                self.limits = (f"stopped: {self._tell(margin)}",)
+                kind: LimitKind = "workspace" if margin.kind == "workspace" else "collision"
+                self.limits = (AtWork(f"stopped: {self._tell(margin)}", kind),)
                 return True
         return False
 

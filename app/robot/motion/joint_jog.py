@@ -5,6 +5,7 @@ import numpy as np
 from app.link.actions import JogJoint
 from app.link.messages import JointDescription
 from app.robot.arm import Reading
+from app.robot.motion.at_work import AtWork
 from app.robot.motion.trajectory import JointTrajectory, describe_limits
 
 
@@ -27,7 +28,7 @@ class JointJog:
         self._wanted[index] = np.clip(action.velocity, -most, most)
         self._left = action.duration
         self._clipped = (
-            (f"{joints[index].name} turns at most at {most:.2f} rad/s",)
+            (AtWork(f"{joints[index].name} turns at most at {most:.2f} rad/s", "speed"),)
             if abs(action.velocity) > most
             else ()
         )

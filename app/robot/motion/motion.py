@@ -1,7 +1,5 @@
 """One action at a time, from rest to rest."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from app.config import ArmMotionSettings
@@ -23,16 +21,20 @@ from app.link.actions import (
 from app.robot.arm import Arm, Reading, Vector
 from app.robot.motion import sequence
 from app.robot.motion.ask_for_stop import AskForStop
+from app.robot.motion.at_work import AtWork
 from app.robot.motion.cartesian_jog import CartesianJog
 from app.robot.motion.go_to import GoClear, GoTo
 from app.robot.motion.grip import Grip
 from app.robot.motion.guard import Guard
 from app.robot.motion.joint_jog import JointJog
 from app.robot.motion.limits import Limits
+from app.robot.motion.move_linear import LinearMove
 from app.robot.motion.planner import Planner, Search
+from app.robot.motion.repeat import Place, counted_out
 from app.robot.motion.task import Refused, Task
 from app.robot.motion.trajectory import JointTrajectory
 from app.robot.motion.turn_joint import JointTurn
+from app.robot.motion.wait import Pause
 
 _FINGERS_STILL = 0.002
 """m/s"""
@@ -69,9 +71,11 @@ class Motion:
         """What is being done, until the arm is at rest again."""
         self.wants_stop = False
         """A sequence has come to a stop: the caller is to stop the robot."""
+        self.gave_up: AtWork | None = None
+        """Why the newest action ended although it was not done."""
         self._task: Task | None = None
-        self._refused: tuple[str, ...] = ()
-        """Why the last task did not go on, while its gesture is held."""
+        self._limits: tuple[str, ...] = ()
+        self._force: float | None = None
         self._braking_hard = False
         self._width: float | None = None
         self._finger_speed = 0.0
@@ -88,25 +92,28 @@ class Motion:
 
     @property
     def limits(self) -> tuple[str, ...]:
-        """Limits at work, in plain words."""
-        if self._task is None:
-            return self._refused
-        return self._task.limits + self.guard.limits
+        """Limits at work, or why the newest action went no further, in plain words."""
+        return self._limits
 
-    def refusal(self, action: Action | Step) -> str | None:
+    @property
+    def place(self) -> Place | None:
+        """The step of a sequence that is being done."""
+        return self._task.place if isinstance(self._task, sequence.Sequence) else None
+
+    def refusal(self, action: Action | Step) -> AtWork | None:
         """Why this arm cannot do ``action``, in plain words; None when it can."""
-        if isinstance(action, MoveLinear | Wait | Repeat):
-            return f"this arm cannot do {action.type} yet"
-        if isinstance(action, Sequence):
+        if isinstance(action, Sequence | Repeat):
             for number, step in enumerate(action.steps, start=1):
                 if (reason := self.refusal(step)) is not None:
-                    return f"step {number}: {reason}"
+                    return reason.at(f"step {number}")
             return None
         poses = self._arm.description.poses
         if isinstance(action, Pose) and action.name not in poses:
-            return f"this robot has no pose {action.name!r}; it has: {', '.join(sorted(poses))}"
+            text = f"this robot has no pose {action.name!r}; it has: {', '.join(sorted(poses))}"
+            return AtWork(text, "unknown_pose")
         if isinstance(action, JogJoint | TurnJoint) and action.joint > len(self._joints):
-            return f"this robot has no joint {action.joint}; it has {len(self._joints)}"
+            text = f"this robot has no joint {action.joint}; it has {len(self._joints)}"
+            return AtWork(text, "unknown_joint")
         return None
 
     def begin(self, action: Action) -> None:
@@ -120,13 +127,13 @@ class Motion:
         if (reason := self.refusal(action)) is not None:
             raise ValueError(reason)
         self._task = self._task_of(action)
-        self._refused = ()
+        self.gave_up = None
         self._braking_hard = False
         self.action = action
 
     def release(self) -> None:
         """The gesture was let go: come to rest at the ordinary pace."""
-        self._refused = ()
+        self._limits = ()
         if self._task is not None and not self._task.release():
             self._task = None
         self._keep_fingers()
@@ -134,7 +141,7 @@ class Motion:
     def halt(self) -> None:
         """A stop: come to rest at once, within 200 ms."""
         self._task = None
-        self._refused = ()
+        self._limits = ()
         if not self._braking_hard:
             self._braking_hard = True
             self._keep_fingers()
@@ -142,7 +149,7 @@ class Motion:
     def reset(self, joints: Vector) -> None:
         """Be at rest where the arm really is, at ``joints`` (rad, shape (n,))."""
         self._task = self.action = None
-        self._refused = ()
+        self._limits = ()
         self.wants_stop = False
         self._braking_hard = False
         self.trajectory.reset(joints)
@@ -158,6 +165,8 @@ class Motion:
             self._go_on(self._task, reading)
         else:
             self.trajectory.brake(hard=self._braking_hard)
+            if self.gave_up is None:
+                self._limits = ()
         if self._task is None and self.trajectory.at_rest:
             self.action = None
             self._braking_hard = False
@@ -168,22 +177,25 @@ class Motion:
         before = trajectory.now
         trajectory.slowed = guard.scale
         try:
-            if task.step(trajectory, reading):
-                self._task = None
+            ended = task.step(trajectory, reading)
             moved = trajectory.position is not before.position
             if guard.active and moved and not guard.allows(trajectory):
                 trajectory.become(before)
                 trajectory.brake()
-                raise Refused(*guard.limits)
+                raise Refused(guard.limits[0])
+            self._limits = task.limits + guard.limits
+            if ended:
+                self._task = None
         except Refused as refused:
             self._task = None
-            self._refused = (str(refused),)
+            self.gave_up = refused.why
+            self._limits = (refused.why,)
 
     def _keep_fingers(self) -> None:
         """Fingers on their way stop where they are; fingers that hold something go on holding."""
         gripping = isinstance(self.action, Gripper | Sequence)
         if gripping and self._width is not None and abs(self._finger_speed) > _FINGERS_STILL:
-            self._arm.grip(self._width)
+            self._arm.grip(self._width, self._force)
 
     def _task_of(self, action: Action | Step) -> Task:
         match action:
@@ -193,6 +205,10 @@ class Motion:
                 return CartesianJog(
                     action, self._arm.kinematics, self.trajectory.limits, self._settings
                 )
+            case MoveLinear():
+                return LinearMove(
+                    action, self._arm.kinematics, self.trajectory.limits, self._settings
+                )
             case TurnJoint():
                 return JointTurn(action, self._joints)
             case Pose():
@@ -200,16 +216,28 @@ class Motion:
             case Home():
                 return self._go_clear(self._arm.home, "home")
             case Gripper():
-                widest = self._arm.description.gripper_max
-                width = min(action.width, widest)
-                clipped = (f"the gripper opens to {widest:.3f} m",) if width < action.width else ()
-                return Grip(width, self._arm.grip, clipped)
+                return self._grip_of(action)
+            case Wait():
+                return Pause(action)
             case Sequence():
-                return sequence.Sequence([self._maker(step) for step in action.steps])
+                return sequence.Sequence(tuple(counted_out(action)), self._task_of)
             case Stop():
                 return AskForStop(self._ask_for_stop)
-            case MoveLinear() | Wait() | Repeat():
-                raise ValueError(f"this arm cannot do {action.type} yet")
+            case Repeat():
+                raise ValueError("a repeat is done only in a sequence")
+
+    def _grip_of(self, action: Gripper) -> Grip:
+        widest = self._arm.description.gripper_max
+        strongest = self._arm.description.gripper_force
+        width, force = min(action.width, widest), action.force
+        clipped: list[str] = []
+        if width < action.width:
+            clipped.append(AtWork(f"the gripper opens to {widest:.3f} m", "gripper"))
+        if force is not None and strongest is not None and force > strongest:
+            clipped.append(AtWork(f"the gripper presses with {strongest:g} N at most", "gripper"))
+            force = strongest
+        self._force = force
+        return Grip(width, force, self._arm.grip, tuple(clipped))
 
     def _go_clear(self, target: tuple[float, ...] | Vector, name: str) -> Task:
         joints = np.array(target, dtype=float)
@@ -227,6 +255,3 @@ class Motion:
 
     def _ask_for_stop(self) -> None:
         self.wants_stop = True
-
-    def _maker(self, step: Step) -> Callable[[], Task]:
-        return lambda: self._task_of(step)

@@ -3,14 +3,19 @@
 from typing import Protocol
 
 from app.robot.arm import Reading
+from app.robot.motion.at_work import AtWork, with_kind
 from app.robot.motion.trajectory import JointTrajectory
 
 
 class Refused(Exception):
-    """A task cannot be done as things are; the message says why, in plain words.
+    """A task cannot be done as things are; ``why`` says so in plain words.
 
     Not an error of anybody: the arm comes to rest, and a sequence goes no further.
     """
+
+    def __init__(self, why: str) -> None:
+        super().__init__(why)
+        self.why: AtWork = with_kind(why)
 
 
 class Task(Protocol):

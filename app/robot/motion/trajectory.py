@@ -17,6 +17,7 @@ import numpy as np
 from ruckig import ControlInterface, InputParameter, Result, Ruckig, Synchronization, Trajectory
 
 from app.robot.arm import Vector
+from app.robot.motion.at_work import AtWork
 from app.robot.motion.limits import Limits, Pace
 
 _REST_VELOCITY = 1e-6
@@ -233,7 +234,7 @@ def _checked(result: Result) -> None:
 def describe_limits(held_back: Vector, names: Sequence[str]) -> tuple[str, ...]:
     """One plain sentence for each joint that stops short of a limit."""
     return tuple(
-        f"{name} is at its {'upper' if side > 0 else 'lower'} limit"
+        AtWork(f"{name} is at its {'upper' if side > 0 else 'lower'} limit", "joint_limit")
         for name, side in zip(names, held_back, strict=True)
         if side != 0
     )

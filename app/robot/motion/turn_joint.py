@@ -5,6 +5,7 @@ import numpy as np
 from app.link.actions import TurnJoint
 from app.link.messages import JointDescription
 from app.robot.arm import Reading
+from app.robot.motion.at_work import AtWork
 from app.robot.motion.go_to import GoTo
 from app.robot.motion.trajectory import JointTrajectory
 
@@ -39,5 +40,6 @@ class JointTurn:
         short = abs(asked - target[index])
         if short > 1e-9:
             side = "upper" if asked > target[index] else "lower"
-            self.limits = (f"{self._joint.name} ends at its {side} limit, {short:.3f} rad short",)
+            text = f"{self._joint.name} ends at its {side} limit, {short:.3f} rad short"
+            self.limits = (AtWork(text, "joint_limit"),)
         return GoTo(target)

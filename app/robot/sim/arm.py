@@ -137,20 +137,22 @@ class SimulatedArm:
             physicsClientId=self.client,
         )
 
-    def grip(self, width: float) -> None:
-        """Open or close the fingers towards ``width`` (m) at the gripper's own speed and force.
+    def grip(self, width: float, force: float | None = None) -> None:
+        """Open or close the fingers towards ``width`` (m) at the gripper's own speed.
 
-        A width outside 0 to the gripper's own is taken for the nearest that it can do.
+        They press with ``force`` (N, each finger), the gripper's own unless given. A width outside
+        0 to the gripper's own, and a force above its own, are taken for the nearest it can do.
         """
         gripper = self.model.gripper
         half = min(max(width, 0.0), gripper.width) / 2
+        press = gripper.force if force is None else min(force, gripper.force)
         for finger in self._fingers:
             pybullet.setJointMotorControl2(
                 self.body,
                 finger,
                 pybullet.POSITION_CONTROL,
                 targetPosition=half,
-                force=gripper.force,
+                force=press,
                 maxVelocity=gripper.speed,
                 positionGain=0.2,
                 physicsClientId=self.client,

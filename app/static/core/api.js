@@ -63,6 +63,15 @@ export const api = Object.freeze({
     },
     updateGesture: (gesture, changes) =>
         request("PATCH", `api/gestures/${id(gesture)}`, { json: changes }),
+    versions: (gesture) => request("GET", `api/gestures/${id(gesture)}/versions`),
+    restoreVersion: (gesture, version) =>
+        request("POST", `api/gestures/${id(gesture)}/versions/${id(version)}/restore`),
+    /** Would an action break a limit? Nothing moves. */
+    dryRun: (robot, action, from) =>
+        request("POST", `api/robots/${id(robot)}/dry-run`, {
+            json: { action, from },
+            timeoutMs: 35000,
+        }),
     addSamples: (gesture, images) =>
         request("POST", `api/gestures/${id(gesture)}/samples`, { body: imageForm(images) }),
     deleteGesture: (gesture) => request("DELETE", `api/gestures/${id(gesture)}`),

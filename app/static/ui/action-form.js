@@ -1,63 +1,39 @@
 // Choosing what a gesture does, without writing JSON.
 
 import { texts } from "../texts/en.js";
-import { button, el } from "./dom.js";
+import { AXES, DIRECTIONS, field, kindOf, numberInput, select, straightOf } from "./action-inputs.js";
+import { el } from "./dom.js";
+import { StepList } from "./step-list.js";
 import { degrees, radians } from "./words.js";
 
 const words = texts.actionForm;
-const AXES = ["x", "y", "z"];
-const DIRECTIONS = ["x+", "x-", "y+", "y-", "z+", "z-"];
-const MOST_STEPS = 32;
-const SIMPLE = ["straight", "jog_joint", "turn_joint", "gripper", "pose", "home", "stop", "exact"];
-let ids = 0;
-
-function field(label, input) {
-    ids += 1;
-    input.id = `action-field-${ids}`;
-    return el("div", { class: "field" }, el("label", { for: input.id, text: label }), input);
-}
-
-function numberInput(name, value, min, max, step = "any") {
-    const shown = String(Number(value.toFixed(2)));
-    return el("input", { type: "number", name, value: shown, min, max, step, required: true });
-}
-
-function select(name, options, value) {
-    return el(
-        "select",
-        { name },
-        ...options.map(([key, text]) =>
-            el("option", { value: key, text, selected: String(key) === String(value) }),
-        ),
-    );
-}
-
-/** The straight direction and speed of a Cartesian jog; null when it is not along one axis. */
-function straightOf(action) {
-    const linear = action.linear || [0, 0, 0];
-    if ((action.angular || []).some(Boolean)) return null;
-    const moving = linear.map((speed, axis) => [speed, axis]).filter(([speed]) => speed);
-    if (moving.length !== 1) return null;
-    const [speed, axis] = moving[0];
-    return { direction: AXES[axis] + (speed > 0 ? "+" : "-"), speed: Math.abs(speed) };
-}
-
-function kindOf(action) {
-    if (action.type !== "jog_cartesian") return action.type;
-    return straightOf(action) ? "straight" : "exact";
-}
+const SIMPLE = [
+    "straight",
+    "move_linear",
+    "jog_joint",
+    "turn_joint",
+    "gripper",
+    "pose",
+    "home",
+    "stop",
+    "exact",
+];
+const MOST_REPEATS = 100;
+const STRONGEST = 200;
 
 /**
  * A form for one action. `value()` reads it; `element` goes into the page. Inside a sequence
- * (`step` is true) jogs ask for how long, and there are no sequences. `touched` says whether
+ * (`inside` is "sequence" or "repeat") jogs ask for how long, one may wait, and there are no
+ * sequences; repeats hold no repeats. `touched` says whether
  * anything was changed: an untouched action is not read back, since degrees are shown rounded.
  */
 export class ActionForm {
-    constructor(action, { description = null, step = false } = {}) {
+    constructor(action, { description = null, inside = null } = {}) {
         this.description = description;
-        this.step = step;
+        this.inside = inside;
         this.action = action || { type: "jog_cartesian", frame: "base", linear: [0.1, 0, 0] };
-        const kinds = step ? SIMPLE : [...SIMPLE, "sequence"];
+        const more = { sequence: ["wait", "repeat"], repeat: ["wait"] }[inside] || ["sequence"];
+        const kinds = [...SIMPLE, ...more];
         this.kind = select("kind", kinds.map((kind) => [kind, words.kinds[kind]]), kindOf(this.action));
         this.fields = el("div", { class: "fields" });
         this.element = el("div", { class: "action-form" }, field(words.kind, this.kind), this.fields);
@@ -73,9 +49,14 @@ export class ActionForm {
 
     /** Whether every field holds something usable; shows what does not. */
     check() {
-        if (this.steps && !this.steps.every(({ form }) => form.check())) return false;
+        if (this.steps && !this.steps.check()) return false;
         const inputs = [...this.fields.querySelectorAll("input")];
         return inputs.every((input) => input.reportValidity());
+    }
+
+    /** Mark the steps whose numbers, from 1, are in the set. */
+    mark(numbers) {
+        if (this.steps) this.steps.mark(numbers);
     }
 
     #input(name) {
@@ -91,7 +72,7 @@ export class ActionForm {
         const kind = this.kind.value;
         const action = kindOf(this.action) === kind ? this.action : {};
         const rows = this[`draw_${kind}`] ? this[`draw_${kind}`](action) : [];
-        if (this.step && ["straight", "exact", "jog_joint"].includes(kind)) {
+        if (this.inside && ["straight", "exact", "jog_joint"].includes(kind)) {
             rows.push(field(words.duration, numberInput("duration", action.duration || 1, 0.1, 60)));
         }
         this.fields.replaceChildren(...rows);
@@ -126,15 +107,8 @@ export class ActionForm {
         const frames = select("frame", Object.entries(words.frames), action.frame || "base");
         return [
             field(words.frame, frames),
-            ...AXES.map((axis, index) =>
-                field(words.linear(axis), numberInput(`linear-${axis}`, linear[index] * 100, -100, 100)),
-            ),
-            ...AXES.map((axis, index) =>
-                field(
-                    words.angular(axis),
-                    numberInput(`angular-${axis}`, degrees(angular[index]), -180, 180),
-                ),
-            ),
+            this.#axes(words.linear, "linear", linear, (value) => value * 100, 100),
+            this.#axes(words.angular, "angular", angular, degrees, 180),
         ];
     }
 
@@ -165,54 +139,59 @@ export class ActionForm {
     }
 
     draw_gripper(action) {
-        const widest = (this.description && this.description.gripper_max) || 0.08;
-        const width = action.width === undefined ? widest : action.width;
-        return [field(words.width, numberInput("width", width * 1000, 0, 200))];
+        const { gripper_max: widest, gripper_force: strongest } = this.description || {};
+        const width = action.width === undefined ? widest || 0.08 : action.width;
+        const force = numberInput("force", action.force, 0.1, STRONGEST, { required: false });
+        force.placeholder = strongest ? String(strongest) : "";
+        return [
+            field(words.width, numberInput("width", width * 1000, 0, 200)),
+            field(words.force, force),
+        ];
+    }
+
+    draw_move_linear(action) {
+        const offset = action.offset || (action.type ? [0, 0, 0] : [0.05, 0, 0]);
+        const rotation = action.rotation || [0, 0, 0];
+        const speed = action.speed ? action.speed * 100 : null;
+        return [
+            field(words.frame, select("frame", Object.entries(words.frames), action.frame || "base")),
+            this.#axes(words.offset, "offset", offset, (value) => value * 100, 100),
+            this.#axes(words.rotation, "rotation", rotation, degrees, 177),
+            field(words.ownSpeed, numberInput("speed", speed, 0.1, 100, { required: false })),
+        ];
+    }
+
+    draw_wait(action) {
+        return [field(words.wait, numberInput("duration", action.duration || 1, 0.1, 60))];
+    }
+
+    draw_repeat(action) {
+        const steps = this.#stepList("repeat", action.steps || [null]);
+        const times = numberInput("times", action.times || 2, 1, MOST_REPEATS, { step: 1 });
+        return [field(words.times, times), ...steps];
     }
 
     draw_sequence(action) {
-        this.steps = [];
-        const list = el("ol", { class: "step-list" });
-        const add = button(words.addStep, { iconName: "plus", onclick: () => append(null) });
-        const redraw = () => {
-            list.replaceChildren(...this.steps.map(({ item }) => item));
-            this.steps.forEach(({ title, up, remove }, index) => {
-                title.textContent = words.step(index + 1);
-                up.setAttribute("aria-label", words.upStep(index + 1));
-                remove.setAttribute("aria-label", words.removeStep(index + 1));
-                up.disabled = index === 0;
-                remove.disabled = this.steps.length === 1;
-            });
-            add.disabled = this.steps.length >= MOST_STEPS;
-        };
-        const append = (value) => {
-            const form = new ActionForm(value, { description: this.description, step: true });
-            const title = el("span", { class: "step-title" });
-            const entry = { form, title };
-            entry.up = button("", {
-                class: "round small",
-                iconName: "up",
-                onclick: () => {
-                    const at = this.steps.indexOf(entry);
-                    this.steps.splice(at - 1, 2, entry, this.steps[at - 1]);
-                    redraw();
-                },
-            });
-            entry.remove = button("", {
-                class: "round small",
-                iconName: "close",
-                onclick: () => {
-                    this.steps.splice(this.steps.indexOf(entry), 1);
-                    redraw();
-                },
-            });
-            const head = el("div", { class: "step-head" }, title, entry.up, entry.remove);
-            entry.item = el("li", {}, head, form.element);
-            this.steps.push(entry);
-            redraw();
-        };
-        for (const value of action.steps || [null, { type: "gripper", width: 0 }]) append(value);
-        return [list, add];
+        return this.#stepList("sequence", action.steps || [null, { type: "gripper", width: 0 }]);
+    }
+
+    #stepList(inside, actions) {
+        const { description } = this;
+        const make = (action) => new ActionForm(action, { description, inside });
+        this.steps = new StepList(make, actions);
+        return this.steps.elements;
+    }
+
+    #axes(label, name, values, shown, most) {
+        const inputs = AXES.map((axis, index) =>
+            field(label(axis), numberInput(`${name}-${axis}`, shown(values[index]), -most, most)),
+        );
+        return el("div", { class: "axes" }, ...inputs);
+    }
+
+    /** What stands in a field that may stay empty, as `{name: value}`; nothing when it is. */
+    #optional(name, part = 1) {
+        return this.#input(name).value === "" ? {} : { [name]: this.#number(name) * part };
     }
 
     /** The action as the server takes it. */
@@ -251,9 +230,25 @@ export class ActionForm {
             case "pose":
                 return { type: kind, name: this.#input("pose").value };
             case "gripper":
-                return { type: kind, width: this.#number("width") / 1000 };
+                return {
+                    type: kind,
+                    width: this.#number("width") / 1000,
+                    ...this.#optional("force"),
+                };
+            case "move_linear":
+                return {
+                    type: kind,
+                    frame: this.#input("frame").value,
+                    offset: AXES.map((axis) => this.#number(`offset-${axis}`) / 100),
+                    rotation: AXES.map((axis) => radians(this.#number(`rotation-${axis}`))),
+                    ...this.#optional("speed", 0.01),
+                };
+            case "wait":
+                return { type: kind, ...lasting };
+            case "repeat":
+                return { type: kind, times: this.#number("times"), steps: this.steps.value() };
             case "sequence":
-                return { type: kind, steps: this.steps.map(({ form }) => form.value()) };
+                return { type: kind, steps: this.steps.value() };
             default:
                 return { type: kind };
         }

@@ -4,6 +4,7 @@ import { texts } from "../texts/en.js";
 import { ActionForm } from "./action-form.js";
 import { Capture } from "./capture.js";
 import { button, el, setText } from "./dom.js";
+import { formerVersions, programCheck } from "./program-check.js";
 import { describeError } from "./words.js";
 
 const words = texts.teach;
@@ -11,7 +12,7 @@ const MOST_THUMBS = 12;
 
 /**
  * Contents for the sheet. `gesture` is null to enrol a new one. `act` does the work and throws
- * ApiError: {create, update, addSamples, remove}. `done(text)` closes the sheet.
+ * ApiError: {create, update, addSamples, remove, versions, restore, check}. `done(text)` closes the sheet.
  */
 export function teachContent({ gesture, store, video, grab, act, recognise, templateUrl, done }) {
     const name = el("input", {
@@ -57,7 +58,7 @@ export function teachContent({ gesture, store, video, grab, act, recognise, temp
             if (typeof error.status !== "number") throw error; // a mistake of the page
             problem.classList.remove("is-waiting");
             setText(problem, describeError(error));
-            if (error.status === 409) name.focus();
+            if (error.code === "duplicate") name.focus();
         } finally {
             busy = false;
             for (const each of buttons) each.disabled = false;
@@ -81,7 +82,11 @@ export function teachContent({ gesture, store, video, grab, act, recognise, temp
         }
         const changes = {};
         if (wanted !== gesture.name) changes.name = wanted;
-        if (form.touched) changes.action = form.value();
+        if (form.touched) {
+            changes.action = form.value();
+            // Refused when somebody else has changed the action since this sheet was opened.
+            if (Number.isInteger(gesture.version)) changes.version = gesture.version;
+        }
         if (Object.keys(changes).length) await act.update(gesture.id, changes);
         if (capture.stills.length) {
             await act.addSamples(gesture.id, capture.stills);
@@ -106,10 +111,30 @@ export function teachContent({ gesture, store, video, grab, act, recognise, temp
             gesture ? enrolled(gesture) : el("p", { class: "quiet", text: words.picturesHint }),
             capture.element,
         ),
-        el("fieldset", {}, el("legend", { text: words.action }), form.element),
+        el(
+            "fieldset",
+            {},
+            el("legend", { text: words.action }),
+            form.element,
+            programCheck({ form, description: store.state.description, check: act.check }),
+            gesture && gesture.version > 1 ? former() : null,
+        ),
         el("div", { class: "sheet-foot" }, problem, row),
     ];
     if (gesture) row.prepend(deletion());
+
+    function former() {
+        return formerVersions({
+            gesture,
+            description: store.state.description,
+            list: () => act.versions(gesture.id),
+            restore: (version) =>
+                run(async () => {
+                    await act.restore(gesture.id, version);
+                    done(texts.check.restored(gesture.name));
+                }),
+        });
+    }
 
     function enrolled({ id, samples, updated }) {
         const count = Number.isFinite(samples) ? samples : 1;

@@ -44,6 +44,29 @@ function cartesian(action) {
     return parts.length ? parts.join(", ") : words.stand;
 }
 
+function way(action) {
+    const frame = action.frame === "tool" ? "tool" : "base";
+    const parts = [];
+    (action.offset || []).forEach((length, axis) => {
+        if (!length) return;
+        const direction = words.straight[frame][AXES[axis] + (length > 0 ? "+" : "-")];
+        parts.push(words.way(direction, short(Math.abs(length) * 100)));
+    });
+    (action.rotation || []).forEach((turn, axis) => {
+        if (!turn) return;
+        const name = frame === "tool" ? `tool ${AXES[axis]}` : AXES[axis];
+        parts.push(words.turnBy(name, short(degrees(turn))));
+    });
+    return parts.length ? parts.join(", ") : words.stand;
+}
+
+function gripper(action, description) {
+    const widest = (description && description.gripper_max) || WIDEST_GRIPPER;
+    if (action.width <= 0.001) return words.closed;
+    if (action.width >= widest * 0.95) return words.open;
+    return words.gripper(short(action.width * 1000));
+}
+
 const WIDEST_GRIPPER = 0.08;
 
 function simple(action, description) {
@@ -57,11 +80,13 @@ function simple(action, description) {
         case "pose":
             return words.pose(action.name);
         case "gripper": {
-            const widest = (description && description.gripper_max) || WIDEST_GRIPPER;
-            if (action.width <= 0.001) return words.closed;
-            if (action.width >= widest * 0.95) return words.open;
-            return words.gripper(short(action.width * 1000));
+            const what = gripper(action, description);
+            return action.force ? words.force(what, short(action.force)) : what;
         }
+        case "move_linear":
+            return way(action);
+        case "wait":
+            return words.wait(short(action.duration));
         case "home":
             return words.home;
         case "stop":
@@ -73,12 +98,14 @@ function simple(action, description) {
 
 /** What an action does, in plain words: "forward 10 cm/s". */
 export function describeAction(action, description = null) {
-    if (action && action.type === "sequence" && Array.isArray(action.steps)) {
+    if (action && Array.isArray(action.steps)) {
         const steps = action.steps.map((step) => describeAction(step, description));
-        return steps.length ? words.sequence(steps[0], steps.length - 1) : words.unknown;
+        if (!steps.length) return words.unknown;
+        const all = words.sequence(steps[0], steps.length - 1);
+        return action.type === "repeat" ? words.repeat(action.times, all) : all;
     }
     const what = simple(action, description);
-    return action && action.duration ? words.lasting(what, short(action.duration)) : what;
+    return action && action.duration && action.type !== "wait" ? words.lasting(what, short(action.duration)) : what;
 }
 
 /** An error of the REST interface as one sentence. */

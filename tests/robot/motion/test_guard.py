@@ -162,7 +162,7 @@ def test_from_inside_the_stop_distance_only_the_way_out_is_open(
     rig.do(JogCartesian(linear=(0.0, 0.1, 0.0)), 1.0)
     assert np.abs(rig.arm.joints - start).max() < 1e-3
     assert any(text.startswith("stopped: ") for text in rig.limits)
-    rig.do(JogCartesian(linear=(0.0, -0.1, 0.0)), 1.0)
+    rig.do(JogCartesian(linear=(0.0, -0.1, 0.0)), 1.6)
     assert rig.arm.read().tool.position[1] < flange[1] - 0.08
 
 

@@ -10,6 +10,7 @@ from app.link.actions import (
     Home,
     JogCartesian,
     JogJoint,
+    MoveLinear,
     Pose,
     Sequence,
     Stop,
@@ -220,7 +221,7 @@ def random_action(rng: random.Random) -> Action:
     def speed(most: float) -> float:
         return rng.choice([rng.uniform(-most, most), most, -most, 0.0])
 
-    kind = rng.randrange(6)
+    kind = rng.randrange(7)
     if kind <= 1:
         return JogJoint(joint=rng.randint(1, 6), velocity=speed(4.3))
     if kind <= 3:
@@ -228,6 +229,13 @@ def random_action(rng: random.Random) -> Action:
             frame=rng.choice(["base", "tool"]),
             linear=(speed(1.0), speed(1.0), speed(1.0)),
             angular=tuple(rng.choice([0.0, speed(3.15)]) for _ in range(3)),
+        )
+    if kind == 6:
+        return MoveLinear(
+            frame=rng.choice(["base", "tool"]),
+            offset=(speed(0.3), speed(0.3), speed(0.3)),
+            rotation=tuple(rng.choice([0.0, speed(3.1)]) for _ in range(3)),
+            speed=rng.choice([None, 0.05, 1.0]),
         )
     if kind == 4:
         return TurnJoint(joint=rng.randint(1, 6), angle=speed(6.3))

@@ -17,7 +17,7 @@ def position_of(arm: SimulatedArm, name: str) -> np.ndarray:
     return np.array({thing.name: thing.position for thing in arm.read().objects}[name])
 
 
-def grasp(driver: Driver, name: str) -> np.ndarray:
+def grasp(driver: Driver, name: str, force: float | None = None) -> np.ndarray:
     """Close the gripper on a thing and lift it 10 cm; returns the joints at the end."""
     arm = driver.arm
     place = position_of(arm, name)
@@ -28,7 +28,7 @@ def grasp(driver: Driver, name: str) -> np.ndarray:
     assert above.converged and at.converged
     driver.go(above.joints, 1.5)
     driver.go(at.joints, 1.0)
-    arm.grip(0.0)
+    arm.grip(0.0, force)
     driver.wait(0.8)
     driver.go(above.joints, 1.0)
     return above.joints
