@@ -23,7 +23,7 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=1000)
     parser.add_argument("--steps", type=int, default=50)
     options = parser.parse_args()
-    counts = {"runs": 0, "cycles": 0, "transitions": 0, "commands dropped": 0}
+    counts = {"runs": 0, "cycles": 0, "transitions": 0, "motions begun": 0, "commands dropped": 0}
 
     class Counted(AnyOrder):
         """Counts what was played."""
@@ -36,6 +36,7 @@ def main() -> None:
         def teardown(self) -> None:
             counts["cycles"] += round((self.it.now - self.began) * 240)
             counts["transitions"] += self.steps
+            counts["motions begun"] += self.begun
             counts["commands dropped"] += sum(self.controller.gate.dropped.values())
 
     started = time.monotonic()

@@ -56,6 +56,8 @@ class AnyOrder(RuleBasedStateMachine):
         self.spent: set[tuple[int, int]] = set()
         """Showings (epoch, hold) that have begun a motion or were shown in vain."""
         self.steps = 0
+        self.begun = 0
+        """Motions that began."""
 
     @initialize()
     def begin(self) -> None:
@@ -242,6 +244,7 @@ class AnyOrder(RuleBasedStateMachine):
                 self.latched = self.latched or ("S1" if stopped else None)
             begun = controller._hold is not None and controller._hold != held
             assert not begun or (allowed and not busy and showing not in self.spent)
+            self.begun += begun
             shown = command.gesture is not None or command.action is not None
             if begun or isinstance(command.action, Stop) or (shown and not allowed):
                 self.spent.add(showing)
