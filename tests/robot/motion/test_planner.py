@@ -1,5 +1,7 @@
 """The search for a way, in a plane with walls: quick to check by hand."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -36,7 +38,7 @@ def test_a_way_round_a_wall_is_clear_all_along(seed: int) -> None:
     assert (way[-1] == GOAL).all()
     corners = [START, *way]
     length = 0.0
-    for a, b in zip(corners, corners[1:], strict=False):
+    for a, b in itertools.pairwise(corners):
         length += float(np.abs(b - a).sum())
         for part in np.linspace(0, 1, 200):
             point = a + (b - a) * part
