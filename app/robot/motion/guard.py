@@ -27,6 +27,7 @@ from app.config import ClearanceSettings
 from app.link.messages import Clearance, WorkspaceDescription
 from app.robot.arm import Kinematics, NearKind, Proximity, Reading, Vector
 from app.robot.motion.at_work import AtWork, LimitKind
+from app.robot.motion.reach import reach_of
 from app.robot.motion.trajectory import JointTrajectory
 
 _LEEWAY = 1e-4
@@ -96,7 +97,7 @@ class Guard:
             "held": settings.stop_held,
             "itself": settings.stop_itself,
         }
-        self.reach = _reach(kinematics, count)
+        self.reach = reach_of(kinematics, count)
         """m, shape (n,): how far any point of the arm can be from each joint's axis."""
         self.scale = 1.0
         """Part of its speed that a task may use, 0 to 1."""
@@ -286,17 +287,3 @@ class Guard:
         link, thing = self.plain(margin.link), self.plain(margin.thing)
         whose = "its own" if margin.kind == "itself" else "the"
         return f"{link} is {millimetres:.0f} mm from {whose} {thing}"
-
-
-def _reach(kinematics: Kinematics, count: int) -> Vector:
-    """How far any point of the arm can be from each joint's axis (m, shape (n,)).
-
-    The tool's distance from the axis is the length of its column of the Jacobian; its largest at
-    many poses, and a hand's breadth for what sticks out beside and before the tool.
-    """
-    rng = np.random.default_rng(1)
-    lengths = [
-        np.linalg.norm(kinematics.jacobian(joints)[:3], axis=0)
-        for joints in rng.uniform(-math.pi, math.pi, (300, count))
-    ]
-    return np.asarray(np.max(lengths, axis=0) + 0.15)

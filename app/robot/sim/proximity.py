@@ -21,11 +21,15 @@ import pybullet
 from app.link.messages import ObjectState
 from app.robot.arm import Near, NearKind, Reading, Vector
 from app.robot.models import ModelAssets
+from app.robot.motion.reach import reach_of
+from app.robot.sim.kinematics import SerialKinematics
 from app.robot.sim.world import add_floor, add_object, connect, load_robot
 
 FLOOR = "floor"
 _MOVED = 2e-4
 """m; things and fingers that have moved less than this stay where they are in this world."""
+_AROUND = 0.15
+"""m; one look farther out serves for all joints from which no point travels farther than this."""
 _TURNED = 2e-3
 """The same for a quaternion's components: 0.2 mm at 50 mm."""
 
@@ -67,6 +71,14 @@ class SimulatedProximity:
                     self._fixed[body] = thing.name
         self._things = self._fixed | {body: name for name, body in self._movable.items()}
         self._movable_bodies = set(self._movable.values())
+        kinematics = SerialKinematics(assets.urdf_path, model.base_link, model.tool_link)
+        self._reach = reach_of(kinematics, len(self._joints))
+        self._looked: Vector | None = None
+        """rad; where all things and pairs were last looked at, and ``_within`` (m) how far out."""
+        self._within = 0.0
+        self._around: list[int] = []
+        """The things that came up there; no other can be within reach."""
+        self._around_pairs: list[tuple[int, int]] = []
         self._placed: dict[str, tuple[Vector, Vector]] = {}
         self._width = -1.0
         self._held: str | None = None
@@ -98,17 +110,21 @@ class SimulatedProximity:
         for thing in reading.objects:
             if thing.name != self._held and thing.name in self._movable:
                 changed |= self._put(thing)
+        if changed:
+            self._looked = None
         return bool(changed)
 
     def near(self, joints: Vector, within: float) -> list[Near]:
         """What is nearer than ``within`` (m) with the joints at ``joints`` (rad, shape (n,))."""
         client, body, hand = self.client, self._body, self._hand
+        self._look_around(joints, within)
         self._place(joints)
         found: dict[tuple[str, str], Near] = {}
         held = self._movable[self._held] if self._held is not None else None
-        for thing, name in self._things.items():
+        for thing in self._around:
             if thing == held:
                 continue
+            name = self._things[thing]
             movable = thing in self._movable_bodies
             for point in pybullet.getClosestPoints(body, thing, within, physicsClientId=client):
                 link = point[3]
@@ -116,7 +132,7 @@ class SimulatedProximity:
                     continue
                 kind: NearKind = "hand" if link in hand else "scene"
                 _keep(found, Near(kind, self._names[link], name, point[8], (point[5], point[6])))
-        for first, second in self._pairs:
+        for first, second in self._around_pairs:
             for point in pybullet.getClosestPoints(
                 body, body, within, first, second, physicsClientId=client
             ):
@@ -169,6 +185,31 @@ class SimulatedProximity:
             for (first, a), (second, b) in itertools.combinations(solid, 2)
             if abs(self._depths[a] - self._depths[b]) > 1
             and frozenset((first, second)) not in never
+        ]
+
+    def _look_around(self, joints: Vector, within: float) -> None:
+        """Find out what can be within reach at all, unless that is known from nearby."""
+        if (
+            self._looked is not None
+            and within <= self._within
+            and np.abs(joints - self._looked) @ self._reach < _AROUND
+        ):
+            return
+        self._place(joints)
+        body, client, far = self._body, self.client, within + _AROUND
+        self._looked, self._within = joints.copy(), within
+        self._around = [
+            thing
+            for thing in self._things
+            if any(
+                point[3] not in self._still
+                for point in pybullet.getClosestPoints(body, thing, far, physicsClientId=client)
+            )
+        ]
+        self._around_pairs = [
+            pair
+            for pair in self._pairs
+            if pybullet.getClosestPoints(body, body, far, *pair, physicsClientId=client)
         ]
 
     def _place(self, joints: Vector) -> None:

@@ -89,6 +89,23 @@ def test_a_line_out_of_reach_slows_down_and_stops() -> None:
     assert any("singular" in text for text in rig.limits)
 
 
+@pytest.mark.parametrize(
+    "linear", [(0.3, 0.0, 0.0), (0.3, 0.3, 0.0), (0.2, 0.0, 0.3), (-0.3, 0.0, 0.0), (0.0, 0.0, 0.4)]
+)
+def test_from_a_singular_position_the_way_back_is_open(linear: tuple[float, float, float]) -> None:
+    """Out until it goes no further; then back at the speed asked for, within every limit."""
+    rig = Rig(FakeArm(bounded=False))
+    rig.do(JogCartesian(linear=linear), 5.0)
+    assert any("singular" in text or "at its limit" in text for text in rig.limits)
+    end = rig.arm.read().tool.position
+    back = tuple(-0.5 * part for part in linear)
+    rig.do(JogCartesian(linear=back), 3.0)
+    moved = rig.arm.read().tool.position - end
+    away = moved @ np.array(back) / np.linalg.norm(back)
+    assert away > 0.1
+    assert np.linalg.norm(moved - away * np.array(back) / np.linalg.norm(back)) < 1e-3  # straight
+
+
 def test_a_jog_into_a_limit_stops_there_and_leaves_it_again() -> None:
     rig = Rig(FakeArm(bounded=False))
     rig.do(JogJoint(joint=3, velocity=4.0), 4.0)

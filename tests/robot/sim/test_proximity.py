@@ -162,3 +162,27 @@ def test_pairs_that_never_touch_do_not(proximity: SimulatedProximity) -> None:
 def test_things_have_plain_names(proximity: SimulatedProximity) -> None:
     assert proximity.plain("link3") == "forearm"
     assert proximity.plain("red_cube") == "red cube"
+
+
+def test_what_was_looked_at_nearby_gives_the_same_answer(proximity: SimulatedProximity) -> None:
+    """A walk in small steps, asked with what is known from steps before, and anew."""
+    fresh = SimulatedProximity(ASSETS)
+    arm = FakeArm()
+    for each in (proximity, fresh):
+        each.follow(arm.read(), standing=True)
+    rng = np.random.default_rng(2)
+    joints, asked = MODEL.pose("ready"), 0
+    for _ in range(300):
+        joints = np.clip(joints + rng.uniform(-0.05, 0.05, len(joints)), LOW, HIGH)
+        fresh._looked = None
+        here = {(n.link, n.thing): n.distance for n in proximity.near(joints, 0.1)}
+        anew = {(n.link, n.thing): n.distance for n in fresh.near(joints, 0.1)}
+        # A thing may have been left elsewhere by another test: only what never moves is compared.
+        movable = {thing.name for thing in MODEL.objects if thing.mass > 0}
+        for found in (here, anew):
+            for pair in [pair for pair in found if movable & set(pair)]:
+                del found[pair]
+        assert here == pytest.approx(anew, abs=1e-6)
+        asked += len(here)
+    fresh.close()
+    assert asked > 300
