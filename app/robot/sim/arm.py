@@ -25,7 +25,7 @@ _BRAKED_SPEED = 0.005
 
 
 class SimulatedArm:
-    """A robot of ``app/robot/models``, its table and its objects, in a Bullet world of its own.
+    """A profile's robot, its table and its objects, in a Bullet world of its own.
 
     Joints are driven as by a servo: Bullet finds, in each step, the torque that brings a joint to
     the wanted speed, ``v + gain * (q_wanted - v dt - q) / dt``, up to the motor's torque. Gravity
@@ -34,7 +34,7 @@ class SimulatedArm:
     Implements :class:`app.robot.arm.Arm`.
 
     Args:
-        model: Folder under ``app/robot/models``.
+        model: A profile: the name of one that comes with Farhand, or a file.
         robot: The robot's id on the link, for its description.
         objects: Whether table and objects are there.
 
@@ -47,7 +47,7 @@ class SimulatedArm:
     ) -> None:
         assets = model_assets(model)
         self.model = assets.model
-        self.description = self.model.describe(robot)
+        self.description = assets.describe(robot)
         self.home: Vector = self.model.pose(self.model.home)
         self.kinematics = SerialKinematics(
             assets.urdf_path, self.model.base_link, self.model.tool_link
@@ -63,7 +63,8 @@ class SimulatedArm:
         )
         self.body, joints, self._links = load_robot(self.client, assets.urdf_path)
         self._joints = [joints[joint.name] for joint in self.model.joints]
-        self._fingers = [joints[name] for name in self.model.gripper.fingers]
+        gripper = self.model.gripper
+        self._fingers = [joints[name] for name in gripper.fingers] if gripper else []
         self._measured = self._joints + self._fingers
         self._torques = [joint.torque for joint in self.model.joints]
         self._brakes = [joint.brake for joint in self.model.joints]
@@ -83,7 +84,8 @@ class SimulatedArm:
                 if thing.mass > 0:
                     self._moving.append((thing.name, body))
         self.move(self.home, np.zeros(len(self._joints)))
-        self.grip(self.model.gripper.width)
+        if gripper:
+            self.grip(gripper.width)
 
     def read(self) -> Reading:
         """Measure: joints, speeds, fingers, and where the objects that can move are.
@@ -125,9 +127,12 @@ class SimulatedArm:
     def grip(self, width: float) -> None:
         """Open or close the fingers towards ``width`` (m) at the gripper's own speed and force.
 
-        A width outside 0 to the gripper's own is taken for the nearest that it can do.
+        A width outside 0 to the gripper's own is taken for the nearest that it can do. Without a
+        gripper this does nothing.
         """
         gripper = self.model.gripper
+        if gripper is None:
+            return
         half = min(max(width, 0.0), gripper.width) / 2
         for finger in self._fingers:
             pybullet.setJointMotorControl2(
@@ -204,13 +209,18 @@ class SimulatedArm:
         """Put the joints somewhere at once, the fingers open."""
         for index, angle in zip(self._joints, joints, strict=True):
             pybullet.resetJointState(self.body, index, angle, physicsClientId=self.client)
+        gripper = self.model.gripper
         for finger in self._fingers:
+            assert gripper is not None
             pybullet.resetJointState(
-                self.body, finger, self.model.gripper.width / 2, physicsClientId=self.client
+                self.body, finger, gripper.width / 2, physicsClientId=self.client
             )
 
     def _couple_fingers(self) -> None:
         """One drive moves both fingers: what is held stays in the middle."""
+        gripper = self.model.gripper
+        if gripper is None:
+            return
         left, right = self._fingers
         gear = pybullet.createConstraint(
             self.body,
@@ -227,7 +237,7 @@ class SimulatedArm:
             gear,
             gearRatio=-1,
             erp=0.2,
-            maxForce=2 * self.model.gripper.force,
+            maxForce=2 * gripper.force,
             physicsClientId=self.client,
         )
 

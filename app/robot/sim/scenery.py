@@ -3,6 +3,8 @@
 import math
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
+from copy import deepcopy
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
@@ -11,10 +13,11 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from app.robot.models import ModelAssets, ObjectModel
-from app.robot.models.assets import read_stl, write_stl
+from app.robot.models import MobileBaseModel, ModelAssets, ObjectModel
+from app.robot.models.assets import write_stl
 from app.robot.sim.kinematics import origin_of
 from app.robot.sim.lens import Matrix
+from app.robot.sim.meshes import Part, read_mesh
 from app.robot.sim.shadow import outline
 from app.robot.sim.world import connect, load_robot, upright
 
@@ -24,6 +27,10 @@ _SKIRT = 0.004
 
 _DETAIL = 0.006
 """m; smaller details of the meshes are not drawn: about a pixel and a half of the scene camera."""
+
+
+Pose2D = tuple[float, float, float]
+"""m, m, rad about Z, in the world."""
 
 
 class Stage:
@@ -49,12 +56,28 @@ class Stage:
         self._open = True
         prepare(self.client)
         self.body, self._joints, self.links = _load_visuals(self.client, assets, links)
-        self._driven = [self._joints[joint.name] for joint in assets.model.joints]
-        self._fingers = [self._joints[name] for name in assets.model.gripper.fingers]
+        model = assets.model
+        self._base = model.base
+        self._driven = (
+            [] if model.base else [self._joints[joint.name] for joint in model.joints]
+        )
+        fingers = model.gripper.fingers if model.gripper else ()
+        self._fingers = [self._joints[name] for name in fingers]
         self.things = {thing.name: add_visual(self.client, thing, own_shapes) for thing in things}
 
-    def pose(self, joints: Iterable[float], gripper: float) -> None:
-        """Put the robot's joints (rad) and its fingers (m between them) somewhere."""
+    def pose(self, joints: Iterable[float], gripper: float, base: Pose2D | None = None) -> None:
+        """Put the robot's joints (rad) and its fingers (m between them) somewhere.
+
+        A mobile base stands at ``base`` (m, m, rad), with its wheels turned as far as its joints
+        (m driven, rad turned) say.
+        """
+        if self._base is not None:
+            self._roll(self._base, *joints)
+            x, y, heading = base or (0.0, 0.0, 0.0)
+            pybullet.resetBasePositionAndOrientation(
+                self.body, (x, y, 0.0), upright(heading), physicsClientId=self.client
+            )
+            return
         half = gripper / 2
         for index, angle in zip(self._driven, joints, strict=True):
             pybullet.resetJointState(self.body, index, angle, physicsClientId=self.client)
@@ -71,7 +94,7 @@ class Stage:
             )
 
     def frames(self, links: list[int]) -> list[Matrix]:
-        """The 4x4 frames of links, base frame; -1 is the base link."""
+        """The 4x4 frames of links, in the world; -1 is the base link."""
         states = pybullet.getLinkStates(
             self.body,
             [link for link in links if link >= 0],
@@ -79,7 +102,23 @@ class Stage:
             physicsClientId=self.client,
         )
         moved = iter(frame_of(state[4], state[5]) for state in states)
-        return [next(moved) if link >= 0 else np.eye(4) for link in links]
+        first = (
+            frame_of(
+                *pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self.client)
+            )
+            if self._base is not None
+            else np.eye(4)
+        )
+        return [next(moved) if link >= 0 else first for link in links]
+
+    def _roll(self, base: MobileBaseModel, driven: float, turned: float) -> None:
+        """Turn the wheels as rolling without slip would have."""
+        for side, names in ((-1, base.left), (1, base.right)):
+            angle = (driven + side * turned * base.track / 2) / base.radius
+            for name in names:
+                pybullet.resetJointState(
+                    self.body, self._joints[name], angle, physicsClientId=self.client
+                )
 
     def close(self) -> None:
         """Give the world back. Closing twice does no harm."""
@@ -203,14 +242,51 @@ def _load_visuals(
             if part.tag == "collision" or (part.tag == "visual" and not drawn):
                 link.remove(part)
     with tempfile.TemporaryDirectory(prefix="farhand-") as folder:
-        for number, mesh in enumerate(tree.getroot().iter("mesh")):
-            corners = read_stl(assets.urdf_path.parent / mesh.get("filename", ""))
-            coarse = Path(folder) / f"{number}.stl"
-            coarse.write_bytes(write_stl(coarsen(corners, _DETAIL)))
-            mesh.set("filename", str(coarse))
+        for link in tree.getroot().findall("link"):
+            for visual in link.findall("visual"):
+                _coarsen_visual(link, visual, assets.urdf_path.parent, Path(folder))
         path = Path(folder) / "visuals.urdf"
         tree.write(path)
         return load_robot(client, path)
+
+
+def _coarsen_visual(
+    link: ElementTree.Element, visual: ElementTree.Element, source: Path, folder: Path
+) -> None:
+    """Put coarse STL meshes, one a colour, in the place of a visual's mesh."""
+    mesh = visual.find("geometry/mesh")
+    if mesh is None:
+        return
+    link.remove(visual)
+    for part in _coarse(source / mesh.get("filename", ""), mesh.get("scale", "1 1 1")):
+        corners = part.corners
+        path = folder / f"{len(list(folder.iterdir()))}.stl"
+        path.write_bytes(write_stl(corners))
+        one = deepcopy(visual)
+        drawn = one.find("geometry/mesh")
+        assert drawn is not None
+        drawn.attrib = {"filename": str(path)}
+        if part.colour is not None:
+            for material in one.findall("material"):
+                one.remove(material)
+            material = ElementTree.SubElement(one, "material", name=f"colour{path.stem}")
+            rgba = " ".join(f"{value:.3f}" for value in (*part.colour, 1.0))
+            ElementTree.SubElement(material, "color", rgba=rgba)
+        link.append(one)
+
+
+@lru_cache(128)
+def _coarse(path: Path, scale: str) -> list[Part]:
+    """A mesh in metres, without its small details; made once for all cameras."""
+    parts = [
+        Part(coarsen(part.corners * _numbers(scale), _DETAIL), part.colour)
+        for part in read_mesh(path)
+    ]
+    return [part for part in parts if len(part.corners)]
+
+
+def _numbers(text: str) -> NDArray[np.float32]:
+    return np.array([float(word) for word in text.split()], np.float32)
 
 
 def _visual_points(visual: ElementTree.Element, urdf: Path) -> Matrix:
@@ -222,7 +298,8 @@ def _visual_points(visual: ElementTree.Element, urdf: Path) -> Matrix:
     elif cylinder is not None:
         points = _cylinder(float(cylinder.get("radius", 0)), float(cylinder.get("length", 0)))
     elif mesh is not None:
-        points = _stl_points(urdf.parent / mesh.get("filename", ""))
+        corners = [part.corners for part in read_mesh(urdf.parent / mesh.get("filename", ""))]
+        points = np.concatenate(corners).reshape(-1, 3).astype(float) * _numbers(mesh.get("scale", "1 1 1"))
     else:
         points = np.zeros((1, 3))
     return np.asarray(points @ frame[:3, :3].T + frame[:3, 3])
@@ -253,7 +330,3 @@ def _cylinder_triangles(radius: float, length: float, sides: int = 24) -> tuple[
         corners += [p + half, q + half, half, q - half, p - half, -half]
         normals += [up, up, up, -up, -up, -up]
     return np.array(corners), np.array(normals)
-
-
-def _stl_points(path: Path) -> Matrix:
-    return np.asarray(read_stl(path).reshape(-1, 3), dtype=np.float64)

@@ -35,8 +35,10 @@ def connect() -> int:
     return client
 
 
-def load_robot(client: int, urdf: Path) -> tuple[int, dict[str, int], dict[str, int]]:
-    """Load a robot fixed to the world.
+def load_robot(
+    client: int, urdf: Path, *, fixed: bool = True
+) -> tuple[int, dict[str, int], dict[str, int]]:
+    """Load a robot, fixed to the world unless told otherwise.
 
     Returns:
         Its body id, the joints by name, and the links by name (the base is -1).
@@ -47,7 +49,7 @@ def load_robot(client: int, urdf: Path) -> tuple[int, dict[str, int], dict[str, 
     try:
         body = pybullet.loadURDF(
             str(urdf),
-            useFixedBase=True,
+            useFixedBase=fixed,
             # Inertias of the file, not of the collision shapes.
             flags=pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_USE_MATERIAL_COLORS_FROM_MTL,
             physicsClientId=client,
