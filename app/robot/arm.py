@@ -30,6 +30,8 @@ class Reading(NamedTuple):
     """m between the fingers"""
     tool: ToolPose
     objects: tuple[ObjectState, ...]
+    base: tuple[float, float, float] | None = None
+    """Of a base that drives: m, m, rad about Z, in the room"""
 
 
 class Kinematics(Protocol):

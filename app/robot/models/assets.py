@@ -84,6 +84,7 @@ def model_assets(name: str) -> ModelAssets:
         except ValueError as error:
             raise AtKey(str(error), "urdf") from error
         check(model, urdf, root)
+        _weigh_frames(root)
     except AtKey as error:
         raise profile.wrong(str(error), *error.path) from error
     return ModelAssets(model, _copy(profile, root, meshes), profile.name, urdf)
@@ -197,6 +198,16 @@ def _hang(
     ElementTree.SubElement(joint, "child", link=first)
     xyz, rpy = (" ".join(map(str, numbers)) for numbers in (attached.xyz, attached.rpy))
     ElementTree.SubElement(joint, "origin", xyz=xyz, rpy=rpy)
+
+
+def _weigh_frames(root: ElementTree.Element) -> None:
+    """Give links without a mass next to none: Bullet would take them for a kilogram each."""
+    for link in root.findall("link"):
+        if link.find("inertial") is None:
+            inertial = ElementTree.SubElement(link, "inertial")
+            ElementTree.SubElement(inertial, "mass", value="0.001")
+            same = dict.fromkeys(("ixx", "iyy", "izz"), "0.000001")
+            ElementTree.SubElement(inertial, "inertia", same, ixy="0", ixz="0", iyz="0")
 
 
 def _copy(profile: Profile, root: ElementTree.Element, meshes: dict[str, Path]) -> Path:

@@ -27,7 +27,7 @@ class JointJog:
         self._wanted[index] = np.clip(action.velocity, -most, most)
         self._left = action.duration
         self._clipped = (
-            (f"{joints[index].name} turns at most at {most:.2f} rad/s",)
+            (f"{joints[index].name} moves at most at {most:.2f} {joints[index].unit}/s",)
             if abs(action.velocity) > most
             else ()
         )

@@ -24,6 +24,7 @@ from app.robot.arm import Arm, Reading, Vector
 from app.robot.motion import sequence
 from app.robot.motion.ask_for_stop import AskForStop
 from app.robot.motion.cartesian_jog import CartesianJog
+from app.robot.motion.driving import DriveJog, DriveWay, cannot_drive
 from app.robot.motion.go_to import GoTo
 from app.robot.motion.grip import Grip
 from app.robot.motion.joint_jog import JointJog
@@ -80,6 +81,13 @@ class Motion:
 
     def refusal(self, action: Action | Step) -> str | None:
         """Why this arm cannot do ``action``, in plain words; None when it can."""
+        description = self._arm.description
+        if description.drives and (reason := cannot_drive(action)) is not None:
+            return reason
+        if isinstance(action, Gripper) and description.gripper_max == 0:
+            return "this robot has no gripper"
+        if description.drives and isinstance(action, MoveLinear):
+            return None
         if isinstance(action, MoveLinear | Wait | Repeat):
             return f"this arm cannot do {action.type} yet"
         if isinstance(action, Sequence):
@@ -150,6 +158,10 @@ class Motion:
 
     def _task_of(self, action: Action | Step) -> Task:
         match action:
+            case JogCartesian() if self._arm.description.drives:
+                return DriveJog(action, self._joints, self._settings.speed)
+            case MoveLinear() if self._arm.description.drives:
+                return DriveWay(action)
             case JogJoint():
                 return JointJog(action, self._joints, self._settings.speed)
             case JogCartesian():

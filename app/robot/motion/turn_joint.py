@@ -39,5 +39,8 @@ class JointTurn:
         short = abs(asked - target[index])
         if short > 1e-9:
             side = "upper" if asked > target[index] else "lower"
-            self.limits = (f"{self._joint.name} ends at its {side} limit, {short:.3f} rad short",)
+            unit = self._joint.unit
+            self.limits = (
+                f"{self._joint.name} ends at its {side} limit, {short:.3f} {unit} short",
+            )
         return GoTo(target)

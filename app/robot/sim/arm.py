@@ -13,6 +13,7 @@ from app.robot.sim.world import (
     add_object,
     connect,
     load_robot,
+    object_state,
 )
 
 _POSITION_GAIN = 0.3
@@ -242,8 +243,4 @@ class SimulatedArm:
         )
 
     def _object(self, name: str, body: int) -> ObjectState:
-        position, (x, y, z, w) = pybullet.getBasePositionAndOrientation(
-            body, physicsClientId=self.client
-        )
-        # Values from Bullet need no checking; this runs 240 times a second.
-        return ObjectState.model_construct(name=name, position=position, orientation=(w, x, y, z))
+        return object_state(self.client, name, body)

@@ -10,6 +10,7 @@ from pathlib import Path
 import pybullet
 
 from app.errors import CannotStart
+from app.link.messages import ObjectState
 from app.robot.models import ObjectModel
 
 STEPS_PER_SECOND = 240
@@ -46,12 +47,15 @@ def load_robot(
     Raises:
         CannotStart: Bullet cannot load the file.
     """
+    # Inertias of the file, not of the collision shapes.
+    flags = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_USE_MATERIAL_COLORS_FROM_MTL
+    if not fixed:  # wheels are round: as a hull of flat faces they would rumble
+        flags |= pybullet.URDF_USE_IMPLICIT_CYLINDER
     try:
         body = pybullet.loadURDF(
             str(urdf),
             useFixedBase=fixed,
-            # Inertias of the file, not of the collision shapes.
-            flags=pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_USE_MATERIAL_COLORS_FROM_MTL,
+            flags=flags,
             physicsClientId=client,
         )
     except pybullet.error as error:
@@ -103,6 +107,13 @@ def add_object(client: int, thing: ObjectModel) -> int:
         physicsClientId=client,
     )
     return int(body)
+
+
+def object_state(client: int, name: str, body: int) -> ObjectState:
+    """Where a thing is."""
+    position, (x, y, z, w) = pybullet.getBasePositionAndOrientation(body, physicsClientId=client)
+    # Values from Bullet need no checking; this runs 240 times a second.
+    return ObjectState.model_construct(name=name, position=position, orientation=(w, x, y, z))
 
 
 def upright(turn: float) -> tuple[float, float, float, float]:
