@@ -15,7 +15,7 @@ class FakeArm:
     def __init__(self, joints: Vector | None = None) -> None:
         assets = model_assets("puma560")
         model = assets.model
-        self.description = model.describe("puma")
+        self.description = assets.describe("puma")
         self.home: Vector = model.pose(model.home)
         self.kinematics = SerialKinematics(assets.urdf_path, model.base_link, model.tool_link)
         self.joints = (self.home if joints is None else joints).copy()

@@ -268,7 +268,7 @@ def test_ends_when_the_link_is_gone(endpoint: str) -> None:
 
 
 def test_a_model_that_is_not_there_is_one_line(endpoint: str) -> None:
-    words = [*command(endpoint), "--model", "r2d2"]
+    words = [*command(endpoint), "--profile", "r2d2"]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=60)
     assert done.returncode == 1
     assert "there is no robot model 'r2d2'; there are: puma560" in done.stderr

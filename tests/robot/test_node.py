@@ -338,7 +338,7 @@ def test_it_ends_when_its_parent_was_gone_before_it_ran(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--model", "r2d2"], "there is no robot model 'r2d2'"),
+        (["--profile", "r2d2"], "there is no robot model 'r2d2'"),
         (["--id", "Puma!"], "id: String should match pattern"),
         (["--latch", "/proc/nowhere/latch"], "the stop latch /proc/nowhere/latch cannot be"),
     ],

@@ -56,9 +56,7 @@ class JointModel(_Part):
     @model_validator(mode="after")
     def _has_room(self) -> Self:
         if self.lower >= self.upper:
-            raise AtKey(
-                f"{self.name}: lower {self.lower} is not below upper {self.upper}", "lower"
-            )
+            raise AtKey(f"{self.name}: lower {self.lower} is not below upper {self.upper}", "lower")
         return self
 
 
@@ -202,9 +200,11 @@ class Model(_Part):
 
     @model_validator(mode="after")
     def _names_differ(self) -> Self:
-        parts = {"joints": self.joints, "cameras": self.cameras, "objects": self.objects}
-        for key, kind in parts.items():
-            names = [part.name for part in kind]
+        for key, names in (
+            ("joints", [joint.name for joint in self.joints]),
+            ("cameras", [camera.name for camera in self.cameras]),
+            ("objects", [thing.name for thing in self.objects]),
+        ):
             for number, name in enumerate(names):
                 if name in names[:number]:
                     raise AtKey(f"{key}: the same name twice, {name}", key, number, "name")

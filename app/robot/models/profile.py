@@ -81,7 +81,10 @@ class Profile:
         line = lines.line_of(self._lines, path)
         rest = f" (and {more} more)" if more else ""
         return CannotStart(
-            f"{self.path}:{line}: {message}{rest}", file=str(self.path), line=line, key=_dotted(path)
+            f"{self.path}:{line}: {message}{rest}",
+            file=str(self.path),
+            line=line,
+            key=_dotted(path),
         )
 
     def _wrong_of(self, error: ValidationError) -> CannotStart:

@@ -1,4 +1,4 @@
-"""What a base that drives can do: ahead and back, and turn. Joint 1 drives (m), joint 2 turns (rad).
+"""What a base can do: drive (joint 1, m) and turn (joint 2, rad).
 
 Its frames ``base`` and ``tool`` are one, its own: x ahead, z up, and they go where it goes.
 """

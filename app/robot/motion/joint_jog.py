@@ -26,8 +26,10 @@ class JointJog:
         most = joints[index].velocity * speed
         self._wanted[index] = np.clip(action.velocity, -most, most)
         self._left = action.duration
+        unit = joints[index].unit
+        does = "turns" if unit == "rad" else "moves"
         self._clipped = (
-            (f"{joints[index].name} moves at most at {most:.2f} {joints[index].unit}/s",)
+            (f"{joints[index].name} {does} at most at {most:.2f} {unit}/s",)
             if abs(action.velocity) > most
             else ()
         )

@@ -158,8 +158,7 @@ def _table_scale(table: ObjectModel) -> float:
 
 
 def _table_texture(table: ObjectModel) -> Picture:
-    """Wood with a line each 10 cm of the base frame (each 50 cm where it is a floor), and a frame
-    round the edge."""
+    """Wood with a line each 10 cm, on a floor 50 cm, of the base frame, and a frame round it."""
     scale = _table_scale(table)
     width, height = (round(edge * scale) for edge in table.size[:2])
     noise = np.random.default_rng(5)

@@ -55,8 +55,9 @@ class Renderer:
             for camera in self.model.cameras
         }
         table = next((thing for thing in self.model.objects if thing.grid), None)
-        lit = table is not None and self.model.cameras
-        self._shadow = Shadow(table, np.array(self.model.cameras[0].light)) if lit else None
+        self._shadow: Shadow | None = None
+        if table is not None and self.model.cameras:
+            self._shadow = Shadow(table, np.array(self.model.cameras[0].light))
         self._throws = link_outlines(assets)
         self._stage = Stage(assets, lambda link: False, ())
         self._links = [self._stage.links[name] for name in self._throws]
@@ -107,9 +108,7 @@ class Renderer:
         Raises:
             KeyError: there is no such camera.
         """
-        return self._views[name].draw(
-            self._joints, self._gripper, self._base, self._shade()
-        )
+        return self._views[name].draw(self._joints, self._gripper, self._base, self._shade())
 
     def close(self) -> None:
         """Give the Bullet worlds back."""
@@ -162,7 +161,8 @@ class _View:
         self.stage = whole or Stage(
             assets,
             lambda link: (
-                (not camera.shows or link in camera.shows) and not (stands_still and link == still_link)
+                (not camera.shows or link in camera.shows)
+                and not (stands_still and link == still_link)
             ),
             loose if stands_still else fixed + loose,
         )
@@ -178,7 +178,9 @@ class _View:
             carrier = np.eye(4) if self._link is None else self.stage.frames([self._link])[0]
             self._view = self._looks_from(carrier)
             room = self._backdrop.draw(self._view)
-        colour = room.colour.copy() if darkness is None else shade(room, darkness, self._shadow_scale)
+        colour = (
+            room.colour.copy() if darkness is None else shade(room, darkness, self._shadow_scale)
+        )
         room = room._replace(colour=colour)
         return self._painter.add(
             room, self.stage, self._lens, self._view, self._camera.light

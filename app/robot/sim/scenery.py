@@ -3,8 +3,6 @@
 import math
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
-from copy import deepcopy
-from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
@@ -14,10 +12,10 @@ import pybullet
 from numpy.typing import NDArray
 
 from app.robot.models import MobileBaseModel, ModelAssets, ObjectModel
-from app.robot.models.assets import write_stl
+from app.robot.models.assets import read_stl
+from app.robot.models.meshes import drawn_urdf
 from app.robot.sim.kinematics import origin_of
 from app.robot.sim.lens import Matrix
-from app.robot.sim.meshes import Part, read_mesh
 from app.robot.sim.shadow import outline
 from app.robot.sim.world import connect, load_robot, upright
 
@@ -58,9 +56,7 @@ class Stage:
         self.body, self._joints, self.links = _load_visuals(self.client, assets, links)
         model = assets.model
         self._base = model.base
-        self._driven = (
-            [] if model.base else [self._joints[joint.name] for joint in model.joints]
-        )
+        self._driven = [] if model.base else [self._joints[joint.name] for joint in model.joints]
         fingers = model.gripper.fingers if model.gripper else ()
         self._fingers = [self._joints[name] for name in fingers]
         self.things = {thing.name: add_visual(self.client, thing, own_shapes) for thing in things}
@@ -181,30 +177,6 @@ def add_visual(client: int, thing: ObjectModel, own_shapes: bool = True) -> int:
     )
 
 
-def coarsen(corners: NDArray[np.float32], cell: float) -> NDArray[np.float32]:
-    """A mesh (corners, shape (n, 3, 3)) without details smaller than ``cell`` (m).
-
-    Vertex clustering (Rossignac and Borrel 1993): corners in the same cell of a grid become their
-    mean, and triangles that lose a side are left out.
-    """
-    flat = corners.reshape(-1, 3)
-    _, which, count = np.unique(
-        np.floor(flat / cell + 0.5).astype(np.int32),
-        axis=0,
-        return_inverse=True,
-        return_counts=True,
-    )
-    which = which.reshape(-1)
-    means = np.zeros((len(count), 3))
-    np.add.at(means, which, flat)
-    means /= count[:, None]
-    triangles = which.reshape(-1, 3)
-    a, b, c = triangles.T
-    kept = triangles[(a != b) & (b != c) & (c != a)]
-    _, first = np.unique(np.sort(kept, axis=1), axis=0, return_index=True)
-    return np.asarray(means[kept[np.sort(first)]], np.float32)
-
-
 def frame_of(position: Sequence[float], quaternion: Sequence[float]) -> Matrix:
     """A 4x4 frame from Bullet's position and quaternion x, y, z, w."""
     frame = np.eye(4)
@@ -215,10 +187,11 @@ def frame_of(position: Sequence[float], quaternion: Sequence[float]) -> Matrix:
 
 def link_outlines(assets: ModelAssets) -> dict[str, Matrix]:
     """Outline points (m, shape (n, 3)) of each link's visual shapes, in the link's frame."""
-    root = ElementTree.parse(assets.urdf_path).getroot()
+    drawn = drawn_urdf(assets, _DETAIL)
+    root = ElementTree.parse(drawn).getroot()
     result = {}
     for link in root.findall("link"):
-        points = [_visual_points(visual, assets.urdf_path) for visual in link.findall("visual")]
+        points = [_visual_points(visual, drawn) for visual in link.findall("visual")]
         if points:
             result[link.get("name", "")] = outline(np.concatenate(points))
     return result
@@ -235,58 +208,18 @@ def _load_visuals(
     client: int, assets: ModelAssets, links: Callable[[str], bool]
 ) -> tuple[int, dict[str, int], dict[str, int]]:
     """Load the robot without collision shapes, and without the visuals of links not drawn."""
-    tree = ElementTree.parse(assets.urdf_path)
+    drawn = drawn_urdf(assets, _DETAIL)
+    tree = ElementTree.parse(drawn)
     for link in tree.getroot().findall("link"):
-        drawn = links(link.get("name", ""))
-        for part in list(link):
-            if part.tag == "collision" or (part.tag == "visual" and not drawn):
-                link.remove(part)
-    with tempfile.TemporaryDirectory(prefix="farhand-") as folder:
-        for link in tree.getroot().findall("link"):
+        if not links(link.get("name", "")):
             for visual in link.findall("visual"):
-                _coarsen_visual(link, visual, assets.urdf_path.parent, Path(folder))
+                link.remove(visual)
+    for mesh in tree.getroot().iter("mesh"):
+        mesh.set("filename", str(drawn.parent / mesh.get("filename", "")))
+    with tempfile.TemporaryDirectory(prefix="farhand-") as folder:
         path = Path(folder) / "visuals.urdf"
         tree.write(path)
         return load_robot(client, path)
-
-
-def _coarsen_visual(
-    link: ElementTree.Element, visual: ElementTree.Element, source: Path, folder: Path
-) -> None:
-    """Put coarse STL meshes, one a colour, in the place of a visual's mesh."""
-    mesh = visual.find("geometry/mesh")
-    if mesh is None:
-        return
-    link.remove(visual)
-    for part in _coarse(source / mesh.get("filename", ""), mesh.get("scale", "1 1 1")):
-        corners = part.corners
-        path = folder / f"{len(list(folder.iterdir()))}.stl"
-        path.write_bytes(write_stl(corners))
-        one = deepcopy(visual)
-        drawn = one.find("geometry/mesh")
-        assert drawn is not None
-        drawn.attrib = {"filename": str(path)}
-        if part.colour is not None:
-            for material in one.findall("material"):
-                one.remove(material)
-            material = ElementTree.SubElement(one, "material", name=f"colour{path.stem}")
-            rgba = " ".join(f"{value:.3f}" for value in (*part.colour, 1.0))
-            ElementTree.SubElement(material, "color", rgba=rgba)
-        link.append(one)
-
-
-@lru_cache(128)
-def _coarse(path: Path, scale: str) -> list[Part]:
-    """A mesh in metres, without its small details; made once for all cameras."""
-    parts = [
-        Part(coarsen(part.corners * _numbers(scale), _DETAIL), part.colour)
-        for part in read_mesh(path)
-    ]
-    return [part for part in parts if len(part.corners)]
-
-
-def _numbers(text: str) -> NDArray[np.float32]:
-    return np.array([float(word) for word in text.split()], np.float32)
 
 
 def _visual_points(visual: ElementTree.Element, urdf: Path) -> Matrix:
@@ -298,8 +231,7 @@ def _visual_points(visual: ElementTree.Element, urdf: Path) -> Matrix:
     elif cylinder is not None:
         points = _cylinder(float(cylinder.get("radius", 0)), float(cylinder.get("length", 0)))
     elif mesh is not None:
-        corners = [part.corners for part in read_mesh(urdf.parent / mesh.get("filename", ""))]
-        points = np.concatenate(corners).reshape(-1, 3).astype(float) * _numbers(mesh.get("scale", "1 1 1"))
+        points = read_stl(urdf.parent / mesh.get("filename", "")).reshape(-1, 3).astype(float)
     else:
         points = np.zeros((1, 3))
     return np.asarray(points @ frame[:3, :3].T + frame[:3, 3])

@@ -1,16 +1,23 @@
-"""Meshes as triangles with a colour, whatever kind of file they are in."""
+"""Meshes as triangles with a colour, whatever kind of file they are in, and a URDF to draw from.
 
-from functools import lru_cache
+What is drawn needs no details that nobody sees: a copy of the URDF beside the first, made once,
+holds coarse STL meshes, one a colour, and no collision shapes.
+"""
+
+import shutil
+import tempfile
+from copy import deepcopy
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
+from xml.etree import ElementTree
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import CannotStart
-from app.robot.models.assets import read_stl
+from app.robot.models.assets import ModelAssets, read_stl, write_stl
 
 _SHADES = 8
 """Steps of each colour channel in which differently coloured triangles are told apart."""
@@ -31,9 +38,90 @@ class Part(NamedTuple):
     """None: the file says none, and the URDF's material counts."""
 
 
-@lru_cache(64)
+def drawn_urdf(assets: ModelAssets, detail: float) -> Path:
+    """A URDF for drawing: without details smaller than ``detail`` (m), and without collisions.
+
+    Raises:
+        CannotStart: a mesh cannot be read.
+    """
+    name = f"drawn-{round(detail * 10000)}"
+    folder = assets.urdf_path.parent / name
+    file = folder / assets.urdf_path.name
+    if file.is_file():
+        return file
+    tree = ElementTree.parse(assets.urdf_path)
+    draft = Path(tempfile.mkdtemp(prefix=f".{name}-", dir=assets.urdf_path.parent))
+    for link in tree.getroot().findall("link"):
+        for collision in link.findall("collision"):
+            link.remove(collision)
+        for visual in link.findall("visual"):
+            _simplify(link, visual, assets.urdf_path.parent, draft, detail)
+    tree.write(draft / file.name)
+    try:
+        draft.rename(folder)
+    except OSError:  # another process was faster; its copy is the same
+        shutil.rmtree(draft, ignore_errors=True)
+    return file
+
+
+def _simplify(
+    link: ElementTree.Element,
+    visual: ElementTree.Element,
+    source: Path,
+    folder: Path,
+    detail: float,
+) -> None:
+    """Put coarse STL meshes, one a colour, in the place of a visual's mesh."""
+    mesh = visual.find("geometry/mesh")
+    if mesh is None:
+        return
+    link.remove(visual)
+    scale = np.array([float(word) for word in mesh.get("scale", "1 1 1").split()], np.float32)
+    for part in read_mesh(source / mesh.get("filename", "")):
+        corners = coarsen(part.corners * scale, detail)
+        if not len(corners):
+            continue
+        path = folder / f"{len(list(folder.iterdir()))}.stl"
+        path.write_bytes(write_stl(corners))
+        one = deepcopy(visual)
+        drawn = one.find("geometry/mesh")
+        assert drawn is not None
+        drawn.attrib = {"filename": path.name}
+        if part.colour is not None:
+            for material in one.findall("material"):
+                one.remove(material)
+            material = ElementTree.SubElement(one, "material", name=f"colour{path.stem}")
+            rgba = " ".join(f"{value:.3f}" for value in (*part.colour, 1.0))
+            ElementTree.SubElement(material, "color", rgba=rgba)
+        link.append(one)
+
+
+def coarsen(corners: NDArray[np.float32], cell: float) -> NDArray[np.float32]:
+    """A mesh (corners, shape (n, 3, 3)) without details smaller than ``cell`` (m).
+
+    Vertex clustering (Rossignac and Borrel 1993): corners in the same cell of a grid become their
+    mean, and triangles that lose a side are left out.
+    """
+    flat = corners.reshape(-1, 3)
+    _, which, count = np.unique(
+        np.floor(flat / cell + 0.5).astype(np.int32),
+        axis=0,
+        return_inverse=True,
+        return_counts=True,
+    )
+    which = which.reshape(-1)
+    means = np.zeros((len(count), 3))
+    np.add.at(means, which, flat)
+    means /= count[:, None]
+    triangles = which.reshape(-1, 3)
+    a, b, c = triangles.T
+    kept = triangles[(a != b) & (b != c) & (c != a)]
+    _, first = np.unique(np.sort(kept, axis=1), axis=0, return_index=True)
+    return np.asarray(means[kept[np.sort(first)]], np.float32)
+
+
 def read_mesh(path: Path) -> list[Part]:
-    """The triangles of an STL, OBJ or COLLADA file, by colour. Each file is read once.
+    """The triangles of an STL, OBJ or COLLADA file, by colour.
 
     Raises:
         CannotStart: the file cannot be read.
@@ -125,6 +213,8 @@ def _read_collada(path: Path) -> list[Part]:
 
     parts: list[Part] = []
     for mesh in trimesh.load_scene(path).dump():
+        if not isinstance(mesh, trimesh.Trimesh):
+            continue
         corners = np.asarray(mesh.triangles, np.float32)
         material = getattr(mesh.visual, "material", None)
         colour: Colour | None = None
@@ -152,7 +242,8 @@ def _merge(parts: list[Part]) -> list[Part]:
     """Parts of the same colour together, and only the few that hold the most triangles apart."""
     groups: dict[tuple[int, ...] | None, list[Part]] = {}
     for part in parts:
-        shade = None if part.colour is None else tuple(int(c * _SHADES * 0.999) for c in part.colour)
+        colour = part.colour
+        shade = None if colour is None else tuple(int(c * _SHADES * 0.999) for c in colour)
         groups.setdefault(shade, []).append(part)
     merged = [
         Part(np.concatenate([part.corners for part in group]), group[0].colour)
