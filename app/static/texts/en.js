@@ -219,6 +219,9 @@ export const texts = Object.freeze({
         gripperOpen: (width) => `${width} mm open`,
         tool: "Tool",
         toolValue: (x, y, z) => `x ${x}  y ${y}  z ${z} cm`,
+        place: "Place",
+        placeValue: (x, y, heading) => `x ${x}  y ${y} cm  ${heading}°`,
+        slideValue: (way) => `${way} cm`,
         nothing: "at rest",
     },
 
@@ -238,6 +241,8 @@ export const texts = Object.freeze({
         angular: (axis, speed) => `turn about ${axis} ${speed}°/s`,
         jogJoint: (joint, speed) => `turn joint ${joint} ${speed}°/s`,
         turnJoint: (joint, angle) => `turn joint ${joint} by ${angle}°`,
+        slideJoint: (joint, speed) => `move joint ${joint} ${speed} cm/s`,
+        slideJointBy: (joint, way) => `move joint ${joint} by ${way} cm`,
         pose: (name) => `go to “${name}”`,
         open: "open gripper",
         closed: "close gripper",
