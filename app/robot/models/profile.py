@@ -89,7 +89,14 @@ class Profile:
 
     def _wrong_of(self, error: ValidationError) -> CannotStart:
         found = [_explain(dict(one)) for one in error.errors()]
-        message, path = min(found, key=lambda one: lines.line_of(self._lines, one[1]))
+        # A key that is spelt wrongly first: it explains the one that is missing.
+        message, path = min(
+            found,
+            key=lambda one: (
+                not one[0].startswith("unknown key"),
+                lines.line_of(self._lines, one[1]),
+            ),
+        )
         return self.wrong(message, *path, more=len(found) - 1)
 
 
