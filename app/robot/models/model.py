@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from app.link.actions import MAX_JOINTS
+from app.link.actions import MAX_JOINTS, Action
 from app.link.messages import (
     CameraDescription,
     Description,
@@ -172,6 +172,11 @@ class Model(_Part):
     poses: dict[str, tuple[float, ...]] = Field(description="rad or m, one number a joint")
     cameras: tuple[CameraModel, ...] = ()
     objects: tuple[ObjectModel, ...] = ()
+    starter: dict[str, Action] = Field(
+        default_factory=dict,
+        description="what gestures of the starter set do with this robot, where not the usual; "
+        "only a new gesture database takes it",
+    )
     workspace: WorkspaceModel | None = Field(default=None, description="none: not bounded")
     never_touch: tuple[tuple[str, str], ...] = Field(
         default=(),

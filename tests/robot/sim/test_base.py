@@ -17,6 +17,7 @@ from app.link.actions import (
     Sequence,
     TurnJoint,
 )
+from app.link.messages import StopCategory
 from app.robot.models import model_assets
 from app.robot.sim.base import SimulatedBase
 from tests.robot.sim.rig import Rig
@@ -99,12 +100,15 @@ def test_turns_are_counted_on_past_half_a_turn(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize("joint", [1, 2])
-@pytest.mark.parametrize("category", ["S2", "S1", "S0"])
-def test_it_stands_within_200_ms_of_every_stop(rig: Rig, joint: int, category: str) -> None:
-    reading = rig.show(JogJoint(joint=joint, velocity=4.0), 1.0)
-    assert reading.velocities[joint - 1] > 0.9 * [0.475, 0.95][joint - 1]
-    assert rig.stop(category) <= 0.2  # type: ignore[arg-type]
-    assert rig.controller.fault is None
+def test_it_stands_within_200_ms_of_every_stop(rig: Rig, joint: int) -> None:
+    categories: tuple[StopCategory, ...] = ("S2", "S1", "S0")
+    for category in categories:
+        reading = rig.show(JogJoint(joint=joint, velocity=4.0), 0.6)
+        assert reading.velocities[joint - 1] > 0.9 * [0.475, 0.95][joint - 1]
+        assert rig.stop(category) <= 0.2, category
+        assert rig.controller.fault is None
+        if category != "S2":
+            rig.reset()
 
 
 def test_braked_wheels_are_locked_even_when_it_is_pushed(rig: Rig) -> None:
@@ -138,29 +142,29 @@ def test_it_pushes_a_crate(rig: Rig) -> None:
     assert rig.controller.fault is None
 
 
-@pytest.mark.parametrize(
-    ("action", "reason"),
-    [
-        (JogCartesian(linear=(0, 0.1, 0)), "it cannot move sideways"),
-        (JogCartesian(frame="tool", linear=(0.1, 0, 0.1)), "it cannot move up or down"),
-        (JogCartesian(angular=(0.1, 0, 0)), "it cannot tilt"),
-        (MoveLinear(offset=(0, 0.1, 0)), "it cannot move sideways"),
-        (MoveLinear(offset=(0.1, 0, 0), rotation=(0, 0, 1)), "make two steps of it"),
-        (Pose(name="start"), "it cannot find a clear way to a place by itself: drive it there"),
-        (Home(), "it cannot find a clear way to a place by itself: drive it there"),
-        (Gripper(width=0.0), "this robot has no gripper"),
-        (
-            Sequence(steps=(TurnJoint(joint=1, angle=0.1), Gripper(width=0.0))),
-            "step 2: this robot has no gripper",
-        ),
-        (JogJoint(joint=3, velocity=0.1), "this robot has no joint 3; it has 2"),
-    ],
-)
-def test_what_it_cannot_do_is_refused_in_plain_words(rig: Rig, action: object, reason: str) -> None:
+REFUSED = [
+    (JogCartesian(linear=(0, 0.1, 0)), "it cannot move sideways"),
+    (JogCartesian(frame="tool", linear=(0.1, 0, 0.1)), "it cannot move up or down"),
+    (JogCartesian(angular=(0.1, 0, 0)), "it cannot tilt"),
+    (MoveLinear(offset=(0, 0.1, 0)), "it cannot move sideways"),
+    (MoveLinear(offset=(0.1, 0, 0), rotation=(0, 0, 1)), "make two steps of it"),
+    (Pose(name="start"), "it cannot find a clear way to a place by itself: drive it there"),
+    (Home(), "it cannot find a clear way to a place by itself: drive it there"),
+    (Gripper(width=0.0), "this robot has no gripper"),
+    (
+        Sequence(steps=(TurnJoint(joint=1, angle=0.1), Gripper(width=0.0))),
+        "step 2: this robot has no gripper",
+    ),
+    (JogJoint(joint=3, velocity=0.1), "this robot has no joint 3; it has 2"),
+]
+
+
+def test_what_it_cannot_do_is_refused_in_plain_words(rig: Rig) -> None:
     before = place(rig)
-    rig.show(action, 0.3)  # type: ignore[arg-type]
-    assert rig.controller.state(rig.now).reason is not None
-    assert reason in str(rig.controller.state(rig.now).reason)
+    for action, reason in REFUSED:
+        rig.show(action, 0.1)  # type: ignore[arg-type]
+        assert reason in str(rig.controller.state(rig.now).reason)
+        rig.wait(0.1)
     assert place(rig) == pytest.approx(before, abs=1e-3)
 
 
