@@ -12,7 +12,15 @@ outside brakes now instead, along the very profile that was checked one step bef
 from collections.abc import Sequence
 
 import numpy as np
-from ruckig import ControlInterface, InputParameter, Result, Ruckig, Synchronization, Trajectory
+from ruckig import (
+    ControlInterface,
+    InputParameter,
+    Result,
+    Ruckig,
+    RuckigError,
+    Synchronization,
+    Trajectory,
+)
 
 from app.robot.arm import Vector
 from app.robot.motion.limits import Limits, Pace
@@ -124,7 +132,12 @@ class JointTrajectory:
         given.max_velocity = pace.velocity.tolist()
         given.target_position = target.tolist()
         given.target_velocity = [0.0] * len(target)
-        _checked(self._ruckig.calculate(given, self._profile))
+        try:
+            _checked(self._ruckig.calculate(given, self._profile))
+        except RuckigError:
+            # Just before the end ruckig may find no way for all joints to arrive at one moment.
+            given.synchronization = Synchronization.No
+            _checked(self._ruckig.calculate(given, self._profile))
         if self._profile.duration <= self.dt:
             self.position = target.copy()
             self._rest()
@@ -162,14 +175,18 @@ class JointTrajectory:
 
         A joint that is outside already counts only if it goes farther out. Shape (n,), bool.
         """
-        given = self._state_input(self.limits.ordinary, position, velocity, acceleration)
+        # Counted from where each joint is: of a joint that hardly moves ruckig gives 0 as an
+        # extreme position, which lies outside the limits of a joint that is never at 0.
+        given = self._state_input(
+            self.limits.ordinary, np.zeros_like(position), velocity, acceleration
+        )
         given.control_interface = ControlInterface.Velocity
         given.synchronization = Synchronization.No
         given.target_velocity = [0.0] * len(position)
         _checked(self._ruckig.calculate(given, self._braking))
         extrema = self._braking.position_extrema
-        highest = np.array([bound.max for bound in extrema])
-        lowest = np.array([bound.min for bound in extrema])
+        highest = position + np.array([bound.max for bound in extrema])
+        lowest = position + np.array([bound.min for bound in extrema])
         above = highest > np.maximum(self.limits.upper, self.position) + _EPSILON
         below = lowest < np.minimum(self.limits.lower, self.position) - _EPSILON
         return np.asarray(above | below)
