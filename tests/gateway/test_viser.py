@@ -81,3 +81,19 @@ def test_viser_that_has_gone_is_told_and_hurts_nothing(with_viser: Running) -> N
         with_viser.socket("/viser", subprotocols=[PROTOCOL])
     assert refused.value.response.status_code == 503
     assert with_viser.http.get("/api/gestures").status_code == 200
+
+
+def test_without_the_robots_profile_the_view_says_so_and_goes_on(
+    folder: Path, node: StandIn
+) -> None:
+    """The stand-in's joints are not the husky's: it is another robot than the profile says."""
+    settings = settings_for(folder, node.endpoint, viser=True)
+    robot = settings.robot.model_copy(update={"profile": "husky"})
+    with running(settings.model_copy(update={"robot": robot})) as server:
+        scene = server.hub.viser
+        assert scene is not None
+        wait_for(lambda: scene.shown_tick, "a state to be shown", 60)
+        with server.socket("/viser", subprotocols=[PROTOCOL]) as socket:
+            heard = b""
+            while b"is not on this machine" not in heard:
+                heard += bytes(socket.recv(timeout=20))
