@@ -63,6 +63,8 @@ class ViserScene:
         self._described: Description | None = None
         self._urdf: ViserUrdf | None = None
         self._root: Any = None
+        self.notice: str | None = None
+        """What the view says in place of the robot."""
         self._pose_joints: Callable[[State], list[float]] = lambda state: []
         self._handles: list[Any] = []
         self._objects: dict[str, Any] = {}
@@ -81,6 +83,11 @@ class ViserScene:
     def shown_tick(self) -> int | None:
         """Tick of the state that the scene shows."""
         return self._shown
+
+    @property
+    def shows_robot(self) -> bool:
+        """Whether the robot's shape is in the scene."""
+        return self._urdf is not None
 
     def close(self) -> None:
         """End the thread and the server."""
@@ -142,6 +149,7 @@ class ViserScene:
             self._urdf.remove()
             self._urdf = None
         self._handles, self._objects, self._shown = [], {}, None
+        self.notice = None
         # Shadows cost software WebGL most of its time.
         server.scene.configure_default_lights(cast_shadow=False)
         self._handles.append(
@@ -178,13 +186,12 @@ class ViserScene:
         joints = [joint.name for joint in description.joints]
         if assets is not None and [joint.name for joint in assets.model.joints] == joints:
             return assets
+        self.notice = (
+            f"The profile of {description.name} is not on this machine: give it with "
+            "--robot-profile FILE to see the robot here. Everything else works."
+        )
         self._handles.append(
-            server.scene.add_label(
-                "/missing",
-                f"The profile of {description.name} is not on this machine: give it with "
-                "--robot-profile FILE to see the robot here. Everything else works.",
-                position=(0.0, 0.0, 1.0),
-            )
+            server.scene.add_label("/missing", self.notice, position=(0.0, 0.0, 1.0))
         )
         return None
 
