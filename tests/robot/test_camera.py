@@ -123,7 +123,7 @@ def node(session: zenoh.Session) -> Iterator[Node]:
 
 
 def command(endpoint: str) -> list[str]:
-    words = "--robot puma --model puma560 --renderer software --endpoint"
+    words = "--robot puma --profile puma560 --renderer software --endpoint"
     return [sys.executable, "-m", "app.robot.camera", *words.split(), endpoint]
 
 
