@@ -51,6 +51,12 @@ def serve(
         str | None,
         typer.Option(help="Zenoh endpoint of a robot node that runs elsewhere; starts none here."),
     ] = None,
+    robot_profile: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE", help="Profile of the robot: a TOML file, or the name of a built-in one."
+        ),
+    ] = None,
 ) -> None:
     """Start the server: the page, the API, the 3D view and a robot node."""
     from app.gateway.serve import serve as run_server
@@ -64,8 +70,13 @@ def serve(
         "tls_key": tls_key,
         "behind_proxy": behind_proxy,
     }
+    robot: dict[str, Any] = {}
     if robot_endpoint is not None:
-        given["robot"] = {"spawn": False, "endpoint": robot_endpoint}
+        robot |= {"spawn": False, "endpoint": robot_endpoint}
+    if robot_profile is not None:
+        robot["profile"] = robot_profile
+    if robot:
+        given["robot"] = robot
     run_server(settings_for(**given))
 
 
@@ -73,7 +84,12 @@ def serve(
 def robot(
     endpoint: Annotated[str, typer.Option(help="Zenoh endpoint to listen on.")],
     id: Annotated[str, typer.Option(help="Name of the robot on the link.")] = "puma",
-    model: Annotated[str, typer.Option(help="Folder under app/robot/models/.")] = "puma560",
+    profile: Annotated[
+        str,
+        typer.Option(
+            metavar="FILE", help="Profile of the robot: a TOML file, or the name of a built-in one."
+        ),
+    ] = "puma560",
     latch: Annotated[
         Path | None, typer.Option(help="File that keeps a latched stop over a restart.")
     ] = None,
@@ -82,7 +98,7 @@ def robot(
     from app.config import NodeSettings
     from app.robot.node import run_node
 
-    run_node(NodeSettings(id=id, model=model, endpoint=endpoint, latch=latch))
+    run_node(NodeSettings(id=id, profile=profile, endpoint=endpoint, latch=latch))
 
 
 @app.command()

@@ -129,7 +129,7 @@ def dry_run(
         if start not in poses:
             names = ", ".join(sorted(poses))
             raise Invalid(f"this robot has no pose {start!r} to begin at; it has: {names}")
-        arm.place(arm.model.pose(start), arm.model.gripper.width, ())
+        arm.place(arm.model.pose(start), arm.description.gripper_max, ())
         report = Rehearsal(arm, ArmMotionSettings()).run(gesture.action)
     finally:
         arm.close()

@@ -303,11 +303,20 @@ class PipelineSettings(_Section):
     quality: QualitySettings = QualitySettings()
 
 
+DEFAULT_PROFILE = "puma560"
+
+
 class RobotSettings(_Section):
     """The robot node that the gateway starts."""
 
     id: str = Field(
         default="puma", pattern=r"^[a-z0-9-]{1,32}$", description="name of the robot on the link"
+    )
+    profile: str | None = Field(
+        default=None,
+        min_length=1,
+        description="profile of the robot: puma560, kuka_iiwa, franka_panda, husky, or a file; "
+        "default: puma560, or for a node that runs elsewhere what that one says",
     )
     spawn: bool = Field(default=True, description="start and supervise a robot node")
     endpoint: str | None = Field(
@@ -422,7 +431,11 @@ class NodeSettings(_Section):
     id: str = Field(
         default="puma", pattern=r"^[a-z0-9-]{1,32}$", description="name of the robot on the link"
     )
-    model: str = Field(default="puma560", description="folder under app/robot/models")
+    profile: str = Field(
+        default=DEFAULT_PROFILE,
+        min_length=1,
+        description="profile of the robot: puma560, kuka_iiwa, franka_panda, husky, or a file",
+    )
     endpoint: str = Field(description="Zenoh endpoint to listen on, unixsock-stream/PATH")
     latch: Path | None = Field(
         default=None, description="file that keeps the latched stop over a restart"

@@ -40,14 +40,14 @@ class StillArm:
     def __init__(self, model: str) -> None:
         assets = model_assets(model)
         self.model = assets.model
-        self.description = self.model.describe("bench")
+        self.description = assets.describe("bench")
         self.home: Vector = self.model.pose(self.model.home)
         self.kinematics = SerialKinematics(
             assets.urdf_path, self.model.base_link, self.model.tool_link
         )
         self.proximity = SimulatedProximity(assets)
         self.joints, self.velocities = self.home.copy(), np.zeros(len(self.home))
-        self.width = self.wanted = self.model.gripper.width
+        self.width = self.wanted = self.description.gripper_max
 
     def read(self) -> Reading:
         """Where it is."""
@@ -68,7 +68,8 @@ class StillArm:
 
     def step(self) -> None:
         """Let 1/240 s pass."""
-        most = 2 * self.model.gripper.speed * DT
+        gripper = self.model.gripper
+        most = 2 * gripper.speed * DT if gripper else 0.0
         self.width += float(np.clip(self.wanted - self.width, -most, most))
 
     def reset_scene(self) -> None:

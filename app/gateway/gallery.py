@@ -13,6 +13,7 @@ from app.errors import CannotStart
 from app.gestures import GestureStore
 from app.link.actions import Action
 from app.pipeline import Gallery, PcaMatcher, unpack_template
+from app.robot.models import load_model
 
 log = logging.getLogger(__name__)
 
@@ -31,9 +32,11 @@ def starter_set() -> Path | None:
 def open_store(settings: Settings) -> GestureStore:
     """Open the database of ``settings``; a new one is filled with the starter set.
 
+    What its gestures do may be different for a robot: see ``starter`` in its profile.
+
     Raises:
         DatabaseBroken: it is there, but cannot be read.
-        CannotStart: the folder cannot be made or written.
+        CannotStart: the folder cannot be made or written, or the robot's profile is wrong.
     """
     url = settings.database_url
     if url is None:
@@ -46,7 +49,9 @@ def open_store(settings: Settings) -> GestureStore:
                 path=str(settings.data_dir),
             ) from error
         url = f"sqlite:///{settings.data_dir.absolute() / DATABASE_FILE}"
-    return GestureStore(url, starter_set())
+    profile = settings.robot.profile
+    actions = load_model(profile).starter if profile is not None else {}
+    return GestureStore(url, starter_set(), actions)
 
 
 def fit(templates: Sequence[tuple[str, bytes]], settings: PipelineSettings) -> PcaMatcher:

@@ -94,7 +94,7 @@ class Hub:
             stack.callback(images.shutdown, wait=False, cancel_futures=True)
             viser: ViserScene | None = None
             if settings.gateway.viser:
-                viser = ViserScene(robot)
+                viser = ViserScene(robot, settings.robot.profile)
                 stack.push_async_callback(asyncio.to_thread, viser.close)
             hub = cls(settings, store, gallery, robot, images, viser)
             stack.push_async_callback(hub._close)

@@ -31,11 +31,11 @@ STOP_WAIT_S = 1.5
 _SECRETS = ("FARHAND_TOKEN",)
 
 
-def node_command(robot: str, endpoint: str, latch: Path) -> list[str]:
+def node_command(robot: str, endpoint: str, latch: Path, profile: str) -> list[str]:
     """The command line of a node."""
     return [
         sys.executable, "-m", "app.robot.node", "--id", robot, "--endpoint", endpoint,
-        "--latch", str(latch), "--parent", str(os.getpid()),
+        "--latch", str(latch), "--profile", profile, "--parent", str(os.getpid()),
     ]  # fmt: skip
 
 

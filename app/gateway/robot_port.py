@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 from typing import Protocol
 
-from app.config import Settings
+from app.config import DEFAULT_PROFILE, Settings
 from app.errors import CannotStart, FarhandError, LinkFailed, RobotUnavailable
 from app.gateway.node_process import NodeProcess, node_command
 from app.link.gateway_end import GatewayEnd, OnPicture
@@ -28,6 +28,7 @@ from app.link.messages import (
     StopRequest,
 )
 from app.link.session import socket_endpoint
+from app.robot.models import model_assets
 
 log = logging.getLogger(__name__)
 
@@ -74,6 +75,9 @@ class RobotPort:
         self._folder: Path | None = None
         self._process: NodeProcess | None = None
         endpoint = settings.robot.endpoint
+        profile = settings.robot.profile or DEFAULT_PROFILE
+        if settings.robot.profile is not None:
+            model_assets(profile)  # a wrong one is told now, in a line, and not by a node that dies
         if settings.robot.spawn:
             try:
                 # mkdtemp: mode 0700, so that nobody else reaches the socket in it.
@@ -81,8 +85,9 @@ class RobotPort:
             except OSError as error:
                 raise CannotStart(f"no private folder for the link: {error}") from error
             endpoint = socket_endpoint(self._folder / "link")
+            latch = settings.data_dir / f"stop-{self.id}.latch"
             self._process = NodeProcess(
-                node_command(self.id, endpoint, settings.data_dir / f"stop-{self.id}.latch"),
+                node_command(self.id, endpoint, latch, profile),
                 last_word=lambda: self._state_at,
                 hung_s=settings.gateway.robot_hung_ms / 1000,
                 start_s=settings.gateway.robot_start_s,

@@ -40,6 +40,7 @@ def robot_message(robot: RobotPort) -> dict[str, Any]:
                 "position": [round(value, 6) for value in state.tool_position],
                 "orientation": [round(value, 6) for value in state.tool_orientation],
             },
+            "base": None if state.base is None else [round(value, 6) for value in state.base],
             "seq": state.frame,
             "stop": state.stop,
             "stops": state.stops,

@@ -10,10 +10,12 @@ import io
 import logging
 import threading
 import time
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from app.errors import CannotStart
 from app.gateway.robot_port import RobotPort
 from app.gateway.viser_aids import SceneAids
 from app.link.messages import Description, ObjectDescription, ObjectState, State
@@ -21,6 +23,8 @@ from app.link.messages import Description, ObjectDescription, ObjectState, State
 if TYPE_CHECKING:
     import viser
     from viser.extras import ViserUrdf
+
+    from app.robot.models import Model, ModelAssets
 
 log = logging.getLogger(__name__)
 
@@ -38,22 +42,32 @@ def _quiet() -> contextlib.redirect_stdout[io.StringIO]:
     return contextlib.redirect_stdout(io.StringIO())
 
 
+DETAIL_M = 0.002
+"""Smaller details of the meshes are not sent to the browser."""
+
+
 class ViserScene:
     """One robot in 3D, served on a free port of the loopback interface.
 
     Args:
         robot: Whose states to follow.
+        profile: Name or file of its profile; default: the one of those that come with Farhand
+            that it says it is.
     """
 
-    def __init__(self, robot: RobotPort) -> None:
+    def __init__(self, robot: RobotPort, profile: str | None = None) -> None:
         self._robot = robot
+        self._profile = profile
         self._server: viser.ViserServer | None = None
         self._ready = threading.Event()
         self._ending = threading.Event()
         self._described: Description | None = None
         self._urdf: ViserUrdf | None = None
         self._aids: SceneAids | None = None
-        self._order: list[int | None] = []
+        self._root: Any = None
+        self.notice: str | None = None
+        """What the view says in place of the robot."""
+        self._pose_joints: Callable[[State], list[float]] = lambda state: []
         self._handles: list[Any] = []
         self._objects: dict[str, Any] = {}
         self._shown: int | None = None
@@ -76,6 +90,11 @@ class ViserScene:
     def shown_tick(self) -> int | None:
         """Tick of the state that the scene shows."""
         return self._shown
+
+    @property
+    def shows_robot(self) -> bool:
+        """Whether the robot's shape is in the scene."""
+        return self._urdf is not None
 
     def close(self) -> None:
         """End the thread and the server."""
@@ -121,7 +140,7 @@ class ViserScene:
             started = time.monotonic()
             self._build(self._server, description)
             log.debug("3D scene built in %.1f s", time.monotonic() - started)
-        if state is None or self._urdf is None or state.tick == self._shown:
+        if state is None or self._described is None or state.tick == self._shown:
             return
         # The first state is shown even when nobody looks: whoever comes next starts from there.
         if self._shown is not None and not self._server.get_clients():
@@ -131,32 +150,29 @@ class ViserScene:
         self._shown = state.tick
 
     def _build(self, server: "viser.ViserServer", description: Description) -> None:
-        from viser.extras import ViserUrdf
-
-        from app.robot.models import model_assets
-
         for handle in self._handles:
             handle.remove()
         if self._aids is not None:
             self._aids.remove()
+            self._aids = None
         if self._urdf is not None:
             self._urdf.remove()
+            self._urdf = None
         self._handles, self._objects, self._shown = [], {}, None
+        self.notice = None
         # Shadows cost software WebGL most of its time.
         server.scene.configure_default_lights(cast_shadow=False)
-        assets = model_assets(description.model)
-        self._urdf = ViserUrdf(server, assets.urdf_path, root_node_name="/robot")
-        self._aids = SceneAids(server, self._urdf, assets.model.workspace)
-        arm = {joint.name: index for index, joint in enumerate(description.joints)}
-        self._order = [arm.get(name) for name in self._urdf.get_actuated_joint_names()]
         self._handles.append(
             server.scene.add_grid(
                 "/grid", width=6.0, height=6.0, cell_size=0.25, section_size=1.0,
                 cell_color=(170, 178, 188), section_color=(140, 150, 162),
             )
         )  # fmt: skip
+        assets = self._find_assets(server, description)
+        if assets is not None:
+            self._build_robot(server, assets)
         # States tell where movable things are; fixed ones stand where the model has them.
-        places = {thing.name: thing for thing in assets.model.objects}
+        places = {} if assets is None else {thing.name: thing for thing in assets.model.objects}
         for thing in description.objects:
             handle = self._objects[thing.name] = self._add(server, thing)
             if thing.name in places:
@@ -165,6 +181,41 @@ class ViserScene:
                 handle.wxyz = (np.cos(half), 0.0, 0.0, np.sin(half))
         self._handles += self._objects.values()
         self._described = description
+
+    def _find_assets(
+        self, server: "viser.ViserServer", description: Description
+    ) -> "ModelAssets | None":
+        """The robot's profile and meshes; None, and a line in the view, when they are not here."""
+        from app.robot.models import model_assets
+
+        try:
+            assets = model_assets(self._profile or description.model)
+        except CannotStart as error:
+            log.warning("no robot in the 3D view: %s", error)
+            assets = None
+        joints = [joint.name for joint in description.joints]
+        if assets is not None and [joint.name for joint in assets.model.joints] == joints:
+            return assets
+        self.notice = (
+            f"The profile of {description.name} is not on this machine: give it with "
+            "--robot-profile FILE to see the robot here. Everything else works."
+        )
+        self._handles.append(
+            server.scene.add_label("/missing", self.notice, position=(0.0, 0.0, 1.0))
+        )
+        return None
+
+    def _build_robot(self, server: "viser.ViserServer", assets: "ModelAssets") -> None:
+        from viser.extras import ViserUrdf
+
+        from app.robot.models.meshes import drawn_urdf
+
+        self._root = server.scene.add_frame("/robot", show_axes=False)
+        self._handles.append(self._root)
+        urdf = ViserUrdf(server, drawn_urdf(assets, DETAIL_M), root_node_name="/robot")
+        self._pose_joints = posed(assets.model, urdf.get_actuated_joint_names())
+        self._urdf = urdf
+        self._aids = SceneAids(server, urdf, assets.model.workspace)
 
     def _add(self, server: "viser.ViserServer", thing: ObjectDescription) -> Any:
         red, green, blue, alpha = thing.colour
@@ -180,15 +231,17 @@ class ViserScene:
         )
 
     def _update(self, state: State) -> None:
-        assert self._urdf is not None and self._aids is not None
-        # Joints that the description does not name are the fingers: each takes half the width.
-        finger = state.gripper / 2
-        actual, commanded = (
-            np.array([finger if index is None else joints[index] for index in self._order])
-            for joints in (state.joints, state.commanded)
-        )
-        self._urdf.update_cfg(actual)
-        self._aids.update(actual, commanded, state.clearance)
+        if self._urdf is not None and self._aids is not None:
+            actual, commanded = (
+                np.asarray(self._pose_joints(each))
+                for each in (state, state.model_copy(update={"joints": state.commanded}))
+            )
+            self._urdf.update_cfg(actual)
+            self._aids.update(actual, commanded, state.clearance)
+            if state.base is not None:
+                x, y, heading = state.base
+                self._root.position = (x, y, 0.0)
+                self._root.wxyz = (np.cos(heading / 2), 0.0, 0.0, np.sin(heading / 2))
         for thing in state.objects:
             self._place(thing)
 
@@ -197,3 +250,25 @@ class ViserScene:
         if handle is not None:
             handle.position = thing.position
             handle.wxyz = thing.orientation
+
+
+def posed(model: "Model", names: Sequence[str]) -> Callable[[State], list[float]]:
+    """Says, of a state, where the URDF's movable joints ``names`` are: rad, or m.
+
+    Each finger takes half the gripper's width; a base's wheels have turned as its joints say; what
+    is neither stays at zero.
+    """
+    arm = {joint.name: index for index, joint in enumerate(model.joints)}
+    fingers = model.gripper.fingers if model.gripper else ()
+
+    def angle(name: str, state: State) -> float:
+        if model.base is not None:
+            for side, wheels in ((-1, model.base.left), (1, model.base.right)):
+                if name in wheels:
+                    driven, turned = state.joints
+                    return (driven + side * turned * model.base.track / 2) / model.base.radius
+        elif name in arm:
+            return state.joints[arm[name]]
+        return state.gripper / 2 if name in fingers else 0.0
+
+    return lambda state: [angle(name, state) for name in names]

@@ -6,8 +6,9 @@ import threading
 import time
 import uuid
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -50,6 +51,7 @@ class GestureStore:
             ``postgresql+psycopg://user@host/farhand``.
         starter: A set in the exchange format; fills a database that did not exist before. None
             leaves a new database empty.
+        actions: What gestures of the starter set do in place of what is written there, by name.
 
     Raises:
         DatabaseBroken: the database is damaged, of a newer version, or of something else.
@@ -57,18 +59,20 @@ class GestureStore:
         StorageFull: no space to make the database.
     """
 
-    def __init__(self, url: str | URL, starter: Path | None) -> None:
+    def __init__(
+        self, url: str | URL, starter: Path | None, actions: Mapping[str, Action] | None = None
+    ) -> None:
         self._engine = database.open_engine(url)
         self._writer = self._engine.execution_options(write=True)
         # Within the process, threads wait here; SQLite's own waiting polls and is not fair.
         self._writing = threading.Lock()
         try:
-            self._open(starter)
+            self._open(starter, actions or {})
         except BaseException:
             self._engine.dispose()
             raise
 
-    def _open(self, starter: Path | None) -> None:
+    def _open(self, starter: Path | None, actions: Mapping[str, Action]) -> None:
         name = database.describe(self._engine)
         with self._write() as session:
             if database.migrate(session.connection(), name) and starter is not None:
@@ -78,6 +82,10 @@ class GestureStore:
                     raise CannotStart(
                         f"the starter set {starter} cannot be read: {error.message}"
                     ) from error
+                entries = [
+                    replace(entry, action=actions.get(entry.name, entry.action))
+                    for entry in entries
+                ]
                 self._put(session, entries, replace=False)
                 log.info("%s is new: filled with %d starter gestures", name, len(entries))
         self.list()

@@ -196,17 +196,19 @@ class JointDescription(Message):
     """One joint and its limits."""
 
     name: str
-    lower: float = Field(description="rad")
+    lower: float = Field(description="rad, or m: see unit")
     upper: float = Field(description="rad")
     velocity: float = Field(description="rad/s")
     acceleration: float = Field(description="rad/s^2")
     jerk: float = Field(description="rad/s^3")
+    unit: Literal["rad", "m"] = Field(default="rad", description="m: it slides, or drives")
 
 
 class CameraDescription(Message):
     """One camera of the robot."""
 
     name: str
+    title: str | None = Field(default=None, description="what to call it; None: by its name")
     width: int
     height: int
     fov_degrees: float = Field(description="vertical field of view")
@@ -236,12 +238,15 @@ class Description(Message):
 
     id: str
     name: str
-    model: str = Field(description="folder under app/robot/models/")
+    model: str = Field(description="short name of its profile")
     joints: tuple[JointDescription, ...]
     poses: dict[str, tuple[float, ...]] = Field(description="named joint positions, rad")
-    gripper_max: float = Field(description="m")
+    gripper_max: float = Field(description="m; 0: it has no gripper")
     gripper_force: float | None = Field(default=None, description="N of each finger, at most")
     workspace: WorkspaceDescription | None = None
+    drives: bool = Field(
+        default=False, description="a mobile base: its two joints drive (m) and turn (rad)"
+    )
     cameras: tuple[CameraDescription, ...]
     objects: tuple[ObjectDescription, ...] = ()
 

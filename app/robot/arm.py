@@ -46,6 +46,8 @@ class Reading(NamedTuple):
     """What the arm touches, itself not counted; none where an arm does not feel"""
     held: str | None = None
     """Name of the thing that both fingers hold"""
+    base: tuple[float, float, float] | None = None
+    """Of a base that drives: m, m, rad about Z, in the room"""
 
 
 NearKind = Literal["scene", "hand", "held", "itself"]

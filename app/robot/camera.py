@@ -1,6 +1,6 @@
 """The camera process: draws what a robot's cameras see, so that control never waits for a picture.
 
-Started by the node as ``python -m app.robot.camera --robot ID --endpoint EP --model MODEL``. It
+Started by the node as ``python -m app.robot.camera --robot ID --endpoint EP --profile PROFILE``. It
 mirrors the newest State that comes over the link, draws a camera only while somebody subscribes to
 it, and sends each state at most once: when states stop coming, pictures stop too, and everyone sees
 from the last one's tick how old it is. It ends when its parent or the link is gone.
@@ -119,7 +119,7 @@ class CameraProcess:
                 _log.warning("a state that cannot be read is passed over: %s", error)
             return None
         if self._shown != state.tick:
-            self._renderer.update(state.joints, state.gripper, state.objects)
+            self._renderer.update(state.joints, state.gripper, state.objects, state.base)
             self._shown = state.tick
         return state
 
@@ -140,7 +140,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m app.robot.camera", description=__doc__)
     parser.add_argument("--robot", required=True, help="id of the robot on the link")
     parser.add_argument("--endpoint", required=True, help="Zenoh endpoint of the robot node")
-    parser.add_argument("--model", default="puma560", help="folder under app/robot/models")
+    parser.add_argument("--profile", default="puma560", help="name or file of the robot's profile")
     parser.add_argument(
         "--renderer",
         choices=["auto", "software", "egl"],
@@ -158,7 +158,7 @@ def main(arguments: list[str] | None = None) -> int:
     os.nice(NICENESS)
     cv2.setNumThreads(1)  # the other cores are for control and for the gateway
     try:
-        renderer = open_renderer(options.model, options.renderer)
+        renderer = open_renderer(options.profile, options.renderer)
         session = open_session(options.endpoint, listen=False)
     except FarhandError as error:
         _log.error("%s", error)

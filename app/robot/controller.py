@@ -193,6 +193,7 @@ class Controller:
             transitions=tuple(safety.transitions),
             objects=reading.objects,
             loop=loop,
+            base=reading.base,
         )
 
     def _answer(self, request: LeaseRequest, now: float) -> LeaseReply:
@@ -317,10 +318,11 @@ class Controller:
         error = self.reading.joints - self.motion.trajectory.position
         worst = int(np.abs(error).argmax())
         if not abs(error[worst]) <= self._following_error:  # also NaN
-            name = self.arm.description.joints[worst].name
+            joint = self.arm.description.joints[worst]
+            what = "robot" if self.arm.description.drives else "arm"
             self.fault = (
-                f"{name} is {abs(error[worst]):.2f} rad away from where it should be: is the arm "
-                "blocked?"
+                f"{joint.name} is {abs(error[worst]):.2f} {joint.unit} away from where it should "
+                f"be: is the {what} blocked?"
             )
             self.safety.stop(StopRequest(source="arm", reason=self.fault))
 

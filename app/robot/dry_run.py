@@ -1,6 +1,6 @@
 """The dry-run process: says whether a program would break a limit, while the node goes on.
 
-Started by the node as ``python -m app.robot.dry_run --robot ID --endpoint EP --model MODEL``. It
+Started by the node as ``python -m app.robot.dry_run --robot ID --endpoint EP --profile P``. It
 answers on the key ``/dry_run``, one question at a time; whoever asks meanwhile is told that it is
 busy. Its arm is made when somebody first asks. It ends when its parent or the link is gone.
 """
@@ -41,7 +41,7 @@ class DryRunProcess:
     Args:
         session: Open, as a client of the node's.
         robot: The robot's id on the link.
-        model: Folder under ``app/robot/models``.
+        profile: Name or file of the robot's profile.
         settings: How fast the robot moves.
         alive: Whether there is still somebody to answer to.
     """
@@ -50,11 +50,11 @@ class DryRunProcess:
         self,
         session: zenoh.Session,
         robot: str,
-        model: str,
+        profile: str,
         settings: ArmMotionSettings,
         alive: Alive,
     ) -> None:
-        self._robot, self._model, self._settings, self._alive = robot, model, settings, alive
+        self._robot, self._profile, self._settings, self._alive = robot, profile, settings, alive
         self._arm: KinematicArm | None = None
         self._state = NewestState()
         self._lock = threading.Lock()
@@ -106,6 +106,9 @@ class DryRunProcess:
         state = None if message is None else decode(State, message)
         if state is None:
             return DryRunReport(code="robot_unavailable", reason="the robot has not spoken yet")
+        if state.base is not None:
+            reason = "a robot that drives has no dry run: nothing tells what is in its way"
+            return DryRunReport(code="no_dry_run", reason=reason)
         arm = self._open_arm()
         poses = arm.description.poses
         if request.start == "current":
@@ -126,7 +129,7 @@ class DryRunProcess:
             # Imported here: PyBullet takes a second and memory, and most never ask.
             from app.robot.sim.kinematic_arm import KinematicArm
 
-            self._arm = KinematicArm(self._model, self._robot, dt=STEP_S)
+            self._arm = KinematicArm(self._profile, self._robot, dt=STEP_S)
         return self._arm
 
 
@@ -135,7 +138,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m app.robot.dry_run", description=__doc__)
     parser.add_argument("--robot", required=True, help="id of the robot on the link")
     parser.add_argument("--endpoint", required=True, help="Zenoh endpoint of the robot node")
-    parser.add_argument("--model", default="puma560", help="folder under app/robot/models")
+    parser.add_argument("--profile", default="puma560", help="name or file of the robot's profile")
     parser.add_argument("--motion", default="{}", help="JSON of how the robot moves its arm")
     options = parser.parse_args(arguments)
     logging.basicConfig(
@@ -157,7 +160,7 @@ def main(arguments: list[str] | None = None) -> int:
         return 1
     alive = Alive(session, parent)
     try:
-        process = DryRunProcess(session, options.robot, options.model, settings, alive)
+        process = DryRunProcess(session, options.robot, options.profile, settings, alive)
         while alive():
             process.turn()
         _log.info("the dry-run process ends: %s", alive.reason)

@@ -115,17 +115,17 @@ def run_node(settings: NodeSettings, arm: Arm | None = None) -> None:
 
     Args:
         settings: Of this node.
-        arm: The arm; the simulated one of ``settings.model`` unless given.
+        arm: The arm; the simulated one of ``settings.profile`` unless given.
 
     Raises:
-        CannotStart: model, meshes or latch file are missing or wrong.
+        CannotStart: profile, meshes or latch file are missing or wrong.
         LinkFailed: the link's endpoint cannot be opened.
     """
     if arm is None:
         # Imported here: PyBullet takes a second, and greets on standard output.
-        from app.robot.sim.arm import SimulatedArm
+        from app.robot.sim.robot import simulated
 
-        arm = SimulatedArm(settings.model, settings.id)
+        arm = simulated(settings.profile, settings.id)
     node = Node(settings, arm, NodeEnd(settings.id, settings.endpoint))
     children = []
     if settings.cameras:
@@ -171,8 +171,8 @@ def _beside(module: str, settings: NodeSettings) -> list[str]:
         settings.id,
         "--endpoint",
         settings.endpoint,
-        "--model",
-        settings.model,
+        "--profile",
+        settings.profile,
     ]
 
 
@@ -180,7 +180,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m app.robot.node", description="A robot node.")
     parser.add_argument("--id", default="puma", help="name of the robot on the link")
-    parser.add_argument("--model", default="puma560", help="folder under app/robot/models")
+    parser.add_argument("--profile", default="puma560", help="name or file of the robot's profile")
     parser.add_argument("--endpoint", required=True, help="unixsock-stream/PATH to listen on")
     parser.add_argument("--latch", type=Path, help="file that keeps a latched stop")
     parser.add_argument("--no-cameras", action="store_true", help="start no camera process")
@@ -195,7 +195,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         settings = NodeSettings(
             id=given.id,
-            model=given.model,
+            profile=given.profile,
             endpoint=given.endpoint,
             latch=given.latch,
             cameras=not given.no_cameras,

@@ -39,11 +39,13 @@ def test_the_view_is_served_through_the_gateway(with_viser: Running, node: Stand
     scene = server.hub.viser
     assert scene is not None
     wait_for(lambda: scene.shown_tick, "the scene to be built", 60)
+    assert scene.shows_robot
+    assert scene.notice is None
     with server.socket("/viser", subprotocols=[PROTOCOL]) as socket:
         assert socket.subprotocol == PROTOCOL
         size = 0
         # The robot's meshes: far more than an empty scene.
-        while size < 50_000:
+        while size < 20_000:
             size += len(socket.recv(timeout=20))
 
     # viser itself listens on loopback alone.
@@ -113,3 +115,19 @@ def test_the_box_has_its_twelve_edges() -> None:
     assert sorted(lengths.sum(axis=1).tolist()) == [1.0] * 4 + [2.0] * 4 + [3.0] * 4
     assert (np.count_nonzero(lengths, axis=1) == 1).all()
     assert len({tuple(map(tuple, edge)) for edge in edges.tolist()}) == 12
+
+
+def test_without_the_robots_profile_the_view_says_so_and_goes_on(
+    folder: Path, node: StandIn
+) -> None:
+    """The stand-in's joints are not the husky's: it is another robot than the profile says."""
+    settings = settings_for(folder, node.endpoint, viser=True)
+    robot = settings.robot.model_copy(update={"profile": "husky"})
+    with running(settings.model_copy(update={"robot": robot})) as server:
+        scene = server.hub.viser
+        assert scene is not None
+        wait_for(lambda: scene.shown_tick, "a state to be shown", 60)
+        assert not scene.shows_robot
+        assert scene.notice is not None
+        assert scene.notice.startswith("The profile of Stand-in is not on this machine")
+        assert server.http.get("/viser/").status_code == 200

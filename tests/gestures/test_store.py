@@ -9,8 +9,17 @@ from app.errors import Duplicate, Invalid, NotFound, StorageFull
 from app.gestures import GestureStore, NewGesture
 from app.gestures.exchange import export_set, import_set
 from app.gestures.records import MAX_SAMPLES
-from app.link.actions import Action, Gripper, Home, JogJoint, Sequence, Stop, TurnJoint
-from tests.gestures.conftest import template, url
+from app.link.actions import (
+    Action,
+    Gripper,
+    Home,
+    JogCartesian,
+    JogJoint,
+    Sequence,
+    Stop,
+    TurnJoint,
+)
+from tests.gestures.conftest import STARTER, template, url
 
 
 def test_an_empty_store_lists_nothing(store: GestureStore) -> None:
@@ -251,3 +260,17 @@ def test_inactive_gestures_stay_so_in_the_exchange_format(
         ("quiet", False),
     ]
     other.close()
+
+
+def test_starter_gestures_may_do_something_else_for_a_robot(tmp_path: Path) -> None:
+    turn = JogCartesian(frame="tool", angular=(0.0, 0.0, 0.5))
+    path = url(tmp_path / "g.db")
+    store = GestureStore(path, STARTER, {"left": turn})
+    actions = {gesture.name: gesture.action for gesture in store.list()}
+    store.close()
+    assert actions["left"] == turn
+    assert actions["stop"].type == "stop"
+    # A database that is there already is left alone.
+    store = GestureStore(path, STARTER, {"right": turn})
+    assert {gesture.name: gesture.action for gesture in store.list()} == actions
+    store.close()

@@ -16,7 +16,7 @@ class FakeArm:
     def __init__(self, joints: Vector | None = None, *, bounded: bool = True) -> None:
         assets = model_assets("puma560")
         model = assets.model
-        self.description = model.describe("puma")
+        self.description = assets.describe("puma")
         if not bounded:
             self.description = self.description.model_copy(update={"workspace": None})
         self.home: Vector = model.pose(model.home)

@@ -11,10 +11,11 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from app.config import NodeSettings
-from app.link.actions import Action, Home, JogJoint, Pose, TurnJoint
+from app.link.actions import Action, Home, JogCartesian, JogJoint, Pose, TurnJoint
 from app.link.gateway_end import GatewayEnd
 from app.link.messages import Command, LeaseReply, LeaseRequest, State, StopRequest, key
 from app.link.node_end import NodeEnd
@@ -22,6 +23,7 @@ from app.link.session import open_session, socket_endpoint
 from app.robot.latch import StopLatch
 from app.robot.node import Node
 from tests.robot.fakes import FakeArm
+from tests.robot.models.profiles import TOML, write_profile
 
 ROOT = Path(__file__).parents[2]
 JOG = JogJoint(joint=1, velocity=1.0)
@@ -338,7 +340,7 @@ def test_it_ends_when_its_parent_was_gone_before_it_ran(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--model", "r2d2"], "there is no robot model 'r2d2'"),
+        (["--profile", "r2d2"], "there is no robot model 'r2d2'"),
         (["--id", "Puma!"], "id: String should match pattern"),
         (["--latch", "/proc/nowhere/latch"], "the stop latch /proc/nowhere/latch cannot be"),
     ],
@@ -364,3 +366,64 @@ def test_what_is_wrong_at_the_start_is_one_line(
     assert done.returncode == 1
     assert "Traceback" not in done.stderr
     assert message in done.stderr.strip().splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("profile", "jog"),
+    [
+        ("kuka_iiwa", JogCartesian(linear=(0.0, 0.0, 0.1))),
+        ("franka_panda", JogCartesian(linear=(0.0, 0.1, 0.0))),
+        ("husky", JogCartesian(frame="tool", linear=(0.4, 0.0, 0.0), angular=(0.0, 0.0, 0.4))),
+    ],
+)
+def test_every_profile_jogs_and_stops_in_a_process_of_its_own(
+    profile: str, jog: JogCartesian
+) -> None:
+    node = NodeProcess("--profile", profile)
+    try:
+        remote = Remote(node.endpoint)
+        description = remote.end.describe(5)
+        assert description.model == profile
+        assert len(description.joints) == len(remote.state.joints)
+        remote.ready()
+        before = np.array(remote.state.joints)
+        moved = 0.05 if description.drives else 0.02
+
+        def has_moved() -> bool:
+            return bool(np.abs(np.array(remote.state.joints) - before).max() > moved)
+
+        remote.show(jog, 1, has_moved, "it moves")
+        assert remote.state.mode == "moving"
+        tick = remote.state.tick
+        remote.end.stop(StopRequest(source="test", reason="enough"))
+        wait_for(lambda: remote.state.mode == "stopped", "S1")
+        wait_for(lambda: remote.speed() < 1e-2, "standstill")
+        assert remote.moved_after(tick) < 500
+        assert (remote.state.base is not None) == description.drives
+        remote.end.close()
+    finally:
+        node.close()
+
+
+def test_a_profile_of_ones_own_and_a_wrong_one(tmp_path: Path) -> None:
+    path = write_profile(tmp_path / "mine")
+    node = NodeProcess("--profile", str(path))
+    try:
+        remote = Remote(node.endpoint)
+        assert remote.end.describe(5).name == "Mine"
+        remote.ready()
+        remote.show(JogJoint(joint=2, velocity=0.2), 1, lambda: remote.state.joints[1] > 0.15, "go")
+        remote.end.close()
+    finally:
+        node.close()
+    path.write_text(TOML.replace("upper = 1.9", "upper = 2.5"))
+    done = subprocess.run(
+        [sys.executable, "-m", "app", "robot", "--endpoint", "x", "--profile", str(path)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 1
+    told = f"farhand: {path}:10: turn: upper 2.5 is beyond the URDF's 2.0\n"
+    assert done.stderr.endswith(told), done.stderr

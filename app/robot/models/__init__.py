@@ -1,24 +1,27 @@
-"""Robot models: a folder each, with a URDF and a ``model.toml``. Nothing here needs PyBullet."""
+"""Robot profiles: a TOML file with its URDF. Nothing here needs PyBullet."""
 
 from app.robot.models.assets import ModelAssets, model_assets
 from app.robot.models.model import (
     CameraModel,
     GripperModel,
     JointModel,
+    MobileBaseModel,
     Model,
     ObjectModel,
-    load_model,
-    model_names,
 )
+from app.robot.models.profile import load_model, load_profile, model_folder, model_names
 
 __all__ = [
     "CameraModel",
     "GripperModel",
     "JointModel",
+    "MobileBaseModel",
     "Model",
     "ModelAssets",
     "ObjectModel",
     "load_model",
+    "load_profile",
     "model_assets",
+    "model_folder",
     "model_names",
 ]

@@ -1,16 +1,15 @@
-"""What a robot model is: the ``model.toml`` beside its URDF, validated."""
+"""What a robot profile says: one TOML file, validated by itself.
 
-import tomllib
-from functools import lru_cache
-from importlib import resources
-from pathlib import Path
+:mod:`app.robot.models.assets` then checks it against its URDF. docs/robots.md explains every key.
+"""
+
 from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from app.errors import CannotStart
+from app.link.actions import MAX_JOINTS, Action
 from app.link.messages import (
     CameraDescription,
     Description,
@@ -23,26 +22,42 @@ Vector3 = tuple[float, float, float]
 Positive = Annotated[float, Field(gt=0)]
 
 
+class AtKey(ValueError):
+    """Something in a profile is wrong, and the key that says it.
+
+    Args:
+        message: What is wrong, and what would be right.
+        path: Keys from the part that is being validated to the one at fault.
+    """
+
+    def __init__(self, message: str, *path: str | int) -> None:
+        super().__init__(message)
+        self.path = path
+
+
 class _Part(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class JointModel(_Part):
-    """One joint of the arm: its name in the URDF and its limits."""
+    """One joint: its name in the URDF and its limits. Radians; metres where it slides.
+
+    A mobile base has two that are not in the URDF: the first drives (m), the second turns (rad).
+    """
 
     name: str
-    lower: float = Field(description="rad")
-    upper: float = Field(description="rad")
-    velocity: Positive = Field(description="rad/s")
-    acceleration: Positive = Field(description="rad/s^2")
-    jerk: Positive = Field(description="rad/s^3")
-    torque: Positive = Field(description="Nm, of the motor")
-    brake: Positive = Field(description="Nm, of the brake")
+    lower: float = Field(description="rad or m")
+    upper: float = Field(description="rad or m")
+    velocity: Positive = Field(description="rad/s or m/s")
+    acceleration: Positive = Field(description="rad/s^2 or m/s^2")
+    jerk: Positive = Field(description="rad/s^3 or m/s^3")
+    torque: Positive = Field(description="Nm or N, of the motor")
+    brake: Positive = Field(description="Nm or N, of the brake")
 
     @model_validator(mode="after")
     def _has_room(self) -> Self:
         if self.lower >= self.upper:
-            raise ValueError(f"{self.name}: lower {self.lower} is not below upper {self.upper}")
+            raise AtKey(f"{self.name}: lower {self.lower} is not below upper {self.upper}", "lower")
         return self
 
 
@@ -55,11 +70,40 @@ class GripperModel(_Part):
     force: Positive = Field(description="N, of each finger")
 
 
+class AttachmentModel(_Part):
+    """A second URDF, such as a gripper's, that hangs on a link of the first."""
+
+    urdf: str = Field(description="file beside the profile, or package://PACKAGE/FILE")
+    to: str = Field(description="link of the robot that carries it")
+    xyz: Vector3 = Field(default=(0.0, 0.0, 0.0), description="m, in the frame of that link")
+    rpy: Vector3 = Field(
+        default=(0.0, 0.0, 0.0), description="rad about fixed X, Y, Z, as in a URDF"
+    )
+
+
+class MobileBaseModel(_Part):
+    """A mobile base that drives and turns on wheels which do not steer (skid steering)."""
+
+    left: tuple[str, ...] = Field(min_length=1, description="wheel joints of the left side")
+    right: tuple[str, ...] = Field(min_length=1, description="wheel joints of the right side")
+    radius: Positive = Field(description="m, of the wheels")
+    track: Positive = Field(
+        description="m between the sides as they act in a turn: wheels that slip sideways make it "
+        "larger than the robot is wide"
+    )
+
+
 class CameraModel(_Part):
     """One camera: where it sits and what it looks at, in the frame of a link."""
 
-    name: str = Field(pattern=r"^[a-z0-9_]+$")
-    link: str = Field(description="URDF link that carries it")
+    name: str = Field(
+        pattern=r"^[a-z0-9_]+$",
+        description="the page shows two: wrist, which rides on the robot, and scene",
+    )
+    title: str | None = Field(
+        default=None, max_length=40, description="what the page calls it; the name unless given"
+    )
+    link: str = Field(description="URDF link that carries it; room: it stands still in the room")
     eye: Vector3 = Field(description="m")
     target: Vector3 = Field(description="m; a point on the optical axis")
     up: Vector3 = Field(description="direction that is up in the picture")
@@ -106,16 +150,34 @@ class WorkspaceModel(_Part):
 class Model(_Part):
     """Everything about a robot that its URDF does not say."""
 
-    name: str
-    urdf: str = Field(description="file beside the model.toml")
-    base_link: str
+    name: str = Field(min_length=1, max_length=80, description="what people call it")
+    urdf: str = Field(
+        description="file beside the profile, an absolute path, or package://PACKAGE/FILE of a "
+        "Python package"
+    )
+    attach: tuple[AttachmentModel, ...] = Field(
+        default=(), description="further URDFs that hang on this one"
+    )
+    base_link: str = Field(description="the URDF's first link; everything is given in its frame")
     tool_link: str = Field(description="its origin is the tool centre point, Z points out")
     home: str = Field(description="the pose of the action ``home``, and where the arm starts")
-    joints: tuple[JointModel, ...] = Field(min_length=1)
-    gripper: GripperModel
-    poses: dict[str, tuple[float, ...]] = Field(description="rad")
-    cameras: tuple[CameraModel, ...]
-    objects: tuple[ObjectModel, ...]
+    joints: tuple[JointModel, ...] = Field(
+        min_length=1,
+        max_length=MAX_JOINTS,
+        description="all that move between base_link and tool_link, from the base on",
+    )
+    gripper: GripperModel | None = Field(default=None, description="none: it cannot grip")
+    base: MobileBaseModel | None = Field(
+        default=None, description="of a robot that drives; its joints are then two, see JointModel"
+    )
+    poses: dict[str, tuple[float, ...]] = Field(description="rad or m, one number a joint")
+    cameras: tuple[CameraModel, ...] = ()
+    objects: tuple[ObjectModel, ...] = ()
+    starter: dict[str, Action] = Field(
+        default_factory=dict,
+        description="what gestures of the starter set do with this robot, where not the usual; "
+        "only a new gesture database takes it",
+    )
     workspace: WorkspaceModel | None = Field(default=None, description="none: not bounded")
     never_touch: tuple[tuple[str, str], ...] = Field(
         default=(),
@@ -131,19 +193,45 @@ class Model(_Part):
     def _poses_fit(self) -> Self:
         for name, pose in self.poses.items():
             if len(pose) != len(self.joints):
-                raise ValueError(f"pose {name}: {len(pose)} numbers for {len(self.joints)} joints")
+                raise AtKey(
+                    f"pose {name}: {len(pose)} numbers for {len(self.joints)} joints", "poses", name
+                )
             for joint, angle in zip(self.joints, pose, strict=True):
                 if not joint.lower <= angle <= joint.upper:
-                    raise ValueError(
+                    raise AtKey(
                         f"pose {name}: {joint.name} at {angle} rad is outside "
-                        f"{joint.lower} to {joint.upper}"
+                        f"{joint.lower} to {joint.upper}",
+                        "poses",
+                        name,
                     )
         if self.home not in self.poses:
-            raise ValueError(f"home: there is no pose {self.home}")
-        for kind in (self.cameras, self.objects):
-            names = [part.name for part in kind]
-            if len(set(names)) != len(names):
-                raise ValueError(f"the same name twice in {names}")
+            raise AtKey(f"home: there is no pose {self.home}", "home")
+        return self
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> Self:
+        for key, names in (
+            ("joints", [joint.name for joint in self.joints]),
+            ("cameras", [camera.name for camera in self.cameras]),
+            ("objects", [thing.name for thing in self.objects]),
+        ):
+            for number, name in enumerate(names):
+                if name in names[:number]:
+                    raise AtKey(f"{key}: the same name twice, {name}", key, number, "name")
+        return self
+
+    @model_validator(mode="after")
+    def _base_fits(self) -> Self:
+        if self.base is None:
+            return self
+        if len(self.joints) != 2:
+            raise AtKey(
+                f"a robot that drives has two joints, one that drives and one that turns, not "
+                f"{len(self.joints)}",
+                "joints",
+            )
+        if self.gripper is not None:
+            raise AtKey("a robot that drives has no gripper yet", "gripper")
         return self
 
     def pose(self, name: str) -> NDArray[np.float64]:
@@ -162,25 +250,36 @@ class Model(_Part):
         """
         return {camera.name: camera for camera in self.cameras}[name]
 
-    def describe(self, robot: str) -> Description:
-        """What the node answers when asked what the robot ``robot`` is."""
+    def describe(self, robot: str, profile: str, slides: tuple[bool, ...]) -> Description:
+        """What the node answers when asked what the robot ``robot`` is.
+
+        Args:
+            robot: Its id.
+            profile: Short name of the profile.
+            slides: Of each joint: whether it slides, and does not turn.
+        """
         return Description(
             id=robot,
             name=self.name,
-            model=Path(self.urdf).stem,
+            model=profile,
             joints=tuple(
-                JointDescription(**joint.model_dump(exclude={"torque", "brake"}))
-                for joint in self.joints
+                JointDescription(
+                    **joint.model_dump(exclude={"torque", "brake"}),
+                    unit="m" if slides_ else "rad",
+                )
+                for joint, slides_ in zip(self.joints, slides, strict=True)
             ),
             poses=self.poses,
             workspace=None
             if self.workspace is None
             else WorkspaceDescription(lower=self.workspace.lower, upper=self.workspace.upper),
-            gripper_max=self.gripper.width,
-            gripper_force=self.gripper.force,
+            gripper_max=0.0 if self.gripper is None else self.gripper.width,
+            gripper_force=None if self.gripper is None else self.gripper.force,
+            drives=self.base is not None,
             cameras=tuple(
                 CameraDescription(
                     name=camera.name,
+                    title=camera.title,
                     width=camera.width,
                     height=camera.height,
                     fov_degrees=camera.fov_degrees,
@@ -198,32 +297,3 @@ class Model(_Part):
                 for thing in self.objects
             ),
         )
-
-
-def model_names() -> list[str]:
-    """The models that come with Farhand."""
-    folder = Path(str(resources.files("app.robot.models")))
-    return sorted(path.parent.name for path in folder.glob("*/model.toml"))
-
-
-@lru_cache
-def load_model(name: str) -> Model:
-    """Read and check the model ``name``.
-
-    Raises:
-        CannotStart: there is no such model, or its file is not right.
-    """
-    if name not in model_names():
-        raise CannotStart(
-            f"there is no robot model {name!r}; there are: {', '.join(model_names())}", model=name
-        )
-    path = model_folder(name) / "model.toml"
-    try:
-        return Model.model_validate(tomllib.loads(path.read_text("utf-8")))
-    except (ValidationError, tomllib.TOMLDecodeError) as error:
-        raise CannotStart(f"{path} is not a robot model: {error}", model=name) from error
-
-
-def model_folder(name: str) -> Path:
-    """Where the files of the model ``name`` are."""
-    return Path(str(resources.files("app.robot.models"))) / name

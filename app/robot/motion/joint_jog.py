@@ -27,8 +27,10 @@ class JointJog:
         most = joints[index].velocity * speed
         self._wanted[index] = np.clip(action.velocity, -most, most)
         self._left = action.duration
+        unit = joints[index].unit
+        does = "turns" if unit == "rad" else "moves"
         self._clipped = (
-            (AtWork(f"{joints[index].name} turns at most at {most:.2f} rad/s", "speed"),)
+            (AtWork(f"{joints[index].name} {does} at most at {most:.2f} {unit}/s", "speed"),)
             if abs(action.velocity) > most
             else ()
         )

@@ -23,6 +23,7 @@ from app.robot.motion import sequence
 from app.robot.motion.ask_for_stop import AskForStop
 from app.robot.motion.at_work import AtWork
 from app.robot.motion.cartesian_jog import CartesianJog
+from app.robot.motion.driving import DriveJog, DriveWay, cannot_drive
 from app.robot.motion.go_to import GoClear, GoTo
 from app.robot.motion.grip import Grip
 from app.robot.motion.guard import Guard
@@ -102,6 +103,11 @@ class Motion:
 
     def refusal(self, action: Action | Step) -> AtWork | None:
         """Why this arm cannot do ``action``, in plain words; None when it can."""
+        description = self._arm.description
+        if description.drives and (cannot := cannot_drive(action)) is not None:
+            return AtWork(cannot, "unreachable")
+        if isinstance(action, Gripper) and description.gripper_max == 0:
+            return AtWork("this robot has no gripper", "gripper")
         if isinstance(action, Sequence | Repeat):
             for number, step in enumerate(action.steps, start=1):
                 if (reason := self.refusal(step)) is not None:
@@ -199,6 +205,10 @@ class Motion:
 
     def _task_of(self, action: Action | Step) -> Task:
         match action:
+            case JogCartesian() if self._arm.description.drives:
+                return DriveJog(action, self._joints, self._settings.speed)
+            case MoveLinear() if self._arm.description.drives:
+                return DriveWay(action)
             case JogJoint():
                 return JointJog(action, self._joints, self._settings.speed)
             case JogCartesian():

@@ -14,7 +14,14 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from ruckig import ControlInterface, InputParameter, Result, Ruckig, Synchronization, Trajectory
+from ruckig import (
+    ControlInterface,
+    InputParameter,
+    Result,
+    Ruckig,
+    Synchronization,
+    Trajectory,
+)
 
 from app.robot.arm import Vector
 from app.robot.motion.at_work import AtWork
@@ -181,14 +188,18 @@ class JointTrajectory:
 
         A joint that is outside already counts only if it goes farther out. Shape (n,), bool.
         """
-        given = self._state_input(self.limits.ordinary, position, velocity, acceleration)
+        # Counted from where each joint is: of a joint that hardly moves ruckig gives 0 as an
+        # extreme position, which lies outside the limits of a joint that is never at 0.
+        given = self._state_input(
+            self.limits.ordinary, np.zeros_like(position), velocity, acceleration
+        )
         given.control_interface = ControlInterface.Velocity
         given.synchronization = Synchronization.No
         given.target_velocity = [0.0] * len(position)
         _checked(self._ruckig.calculate(given, self._braking))
         extrema = self._braking.position_extrema
-        highest = np.array([bound.max for bound in extrema])
-        lowest = np.array([bound.min for bound in extrema])
+        highest = position + np.array([bound.max for bound in extrema])
+        lowest = position + np.array([bound.min for bound in extrema])
         above = highest > np.maximum(self.limits.upper, self.position) + _EPSILON
         below = lowest < np.minimum(self.limits.lower, self.position) - _EPSILON
         return np.asarray(above | below)

@@ -40,6 +40,7 @@ class JointTurn:
         short = abs(asked - target[index])
         if short > 1e-9:
             side = "upper" if asked > target[index] else "lower"
-            text = f"{self._joint.name} ends at its {side} limit, {short:.3f} rad short"
+            unit = self._joint.unit
+            text = f"{self._joint.name} ends at its {side} limit, {short:.3f} {unit} short"
             self.limits = (AtWork(text, "joint_limit"),)
         return GoTo(target)

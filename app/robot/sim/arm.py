@@ -14,7 +14,8 @@ from app.robot.sim.world import (
     add_object,
     connect,
     load_robot,
-    upright,
+    object_state,
+    reset_objects,
 )
 
 _POSITION_GAIN = 0.3
@@ -31,7 +32,7 @@ _LOST_STEPS = 24
 
 
 class SimulatedArm:
-    """A robot of ``app/robot/models``, its table and its objects, in a Bullet world of its own.
+    """A profile's robot, its table and its objects, in a Bullet world of its own.
 
     Joints are driven as by a servo: Bullet finds, in each step, the torque that brings a joint to
     the wanted speed, ``v + gain * (q_wanted - v dt - q) / dt``, up to the motor's torque. Gravity
@@ -40,7 +41,7 @@ class SimulatedArm:
     Implements :class:`app.robot.arm.Arm`.
 
     Args:
-        model: Folder under ``app/robot/models``.
+        model: A profile: the name of one that comes with Farhand, or a file.
         robot: The robot's id on the link, for its description.
         objects: Whether table and objects are there.
 
@@ -53,7 +54,7 @@ class SimulatedArm:
     ) -> None:
         assets = model_assets(model)
         self.model = assets.model
-        self.description = self.model.describe(robot)
+        self.description = assets.describe(robot)
         self.home: Vector = self.model.pose(self.model.home)
         self.kinematics = SerialKinematics(
             assets.urdf_path, self.model.base_link, self.model.tool_link
@@ -71,7 +72,8 @@ class SimulatedArm:
         self._link_names = {index: name for name, index in self._links.items()}
         self.proximity = SimulatedProximity(assets, objects=objects)
         self._joints = [joints[joint.name] for joint in self.model.joints]
-        self._fingers = [joints[name] for name in self.model.gripper.fingers]
+        gripper = self.model.gripper
+        self._fingers = [joints[name] for name in gripper.fingers] if gripper else []
         self._measured = self._joints + self._fingers
         self._torques = [joint.torque for joint in self.model.joints]
         self._brakes = [joint.brake for joint in self.model.joints]
@@ -95,7 +97,8 @@ class SimulatedArm:
                 if thing.mass > 0:
                     self._moving.append((thing.name, body))
         self.move(self.home, np.zeros(len(self._joints)))
-        self.grip(self.model.gripper.width)
+        if gripper:
+            self.grip(gripper.width)
 
     def read(self) -> Reading:
         """Measure: joints, speeds, fingers, and where the objects that can move are.
@@ -142,8 +145,11 @@ class SimulatedArm:
 
         They press with ``force`` (N, each finger), the gripper's own unless given. A width outside
         0 to the gripper's own, and a force above its own, are taken for the nearest it can do.
+        Without a gripper this does nothing.
         """
         gripper = self.model.gripper
+        if gripper is None:
+            return
         half = min(max(width, 0.0), gripper.width) / 2
         press = gripper.force if force is None else min(force, gripper.force)
         for finger in self._fingers:
@@ -175,17 +181,7 @@ class SimulatedArm:
 
     def reset_scene(self) -> None:
         """Put every thing that can move back where it was at first, at rest."""
-        places = {thing.name: thing for thing in self.model.objects}
-        for name, body in self._moving:
-            pybullet.resetBasePositionAndOrientation(
-                body,
-                places[name].position,
-                upright(places[name].turn),
-                physicsClientId=self.client,
-            )
-            pybullet.resetBaseVelocity(
-                body, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), physicsClientId=self.client
-            )
+        reset_objects(self.client, self.model.objects, dict(self._moving))
 
     def step(self) -> None:
         """Let 1/240 s pass."""
@@ -236,13 +232,18 @@ class SimulatedArm:
         """Put the joints somewhere at once, the fingers open."""
         for index, angle in zip(self._joints, joints, strict=True):
             pybullet.resetJointState(self.body, index, angle, physicsClientId=self.client)
+        gripper = self.model.gripper
         for finger in self._fingers:
+            assert gripper is not None
             pybullet.resetJointState(
-                self.body, finger, self.model.gripper.width / 2, physicsClientId=self.client
+                self.body, finger, gripper.width / 2, physicsClientId=self.client
             )
 
     def _couple_fingers(self) -> None:
         """One drive moves both fingers: what is held stays in the middle."""
+        gripper = self.model.gripper
+        if gripper is None:
+            return
         left, right = self._fingers
         gear = pybullet.createConstraint(
             self.body,
@@ -259,7 +260,7 @@ class SimulatedArm:
             gear,
             gearRatio=-1,
             erp=0.2,
-            maxForce=2 * self.model.gripper.force,
+            maxForce=2 * gripper.force,
             physicsClientId=self.client,
         )
 
@@ -285,7 +286,7 @@ class SimulatedArm:
 
     def _find_held(self, forces: dict[tuple[int, int], float]) -> None:
         """A thing that presses on both fingers is held, until it was lost for a while."""
-        for name, body in self._moving:
+        for name, body in self._moving if self._fingers else ():
             if all(forces.get((finger, body), 0.0) > _TOUCH for finger in self._fingers):
                 self._held, self._lost = name, 0
                 return
@@ -294,8 +295,4 @@ class SimulatedArm:
             self._held = None
 
     def _object(self, name: str, body: int) -> ObjectState:
-        position, (x, y, z, w) = pybullet.getBasePositionAndOrientation(
-            body, physicsClientId=self.client
-        )
-        # Values from Bullet need no checking; this runs 240 times a second.
-        return ObjectState.model_construct(name=name, position=position, orientation=(w, x, y, z))
+        return object_state(self.client, name, body)

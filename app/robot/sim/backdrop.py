@@ -17,7 +17,11 @@ from app.robot.sim.lens import Layer, Lens, Matrix, affine
 Picture = NDArray[np.uint8]
 
 TABLE_SCALE = 500
-"""Pixels of the table's texture per metre: 2 mm each."""
+"""Pixels of the table's texture per metre: 2 mm each. Fewer where the longest edge would have more
+than :data:`_LONGEST`."""
+_LONGEST = 1200
+_FLOOR_FROM = 2.0
+"""m; from this edge on a table is a floor."""
 _FLOOR_SCALE = 100
 _FLOOR_EDGE = 6.0
 """m; the floor's texture is a square of this edge round the robot's base."""
@@ -66,6 +70,7 @@ class Backdrop:
                     self._top,
                 ]
             )
+            self._table_scale = _table_scale(table)
             self._texture = _table_texture(table)
 
     def draw(self, view: Matrix) -> Room:
@@ -77,7 +82,7 @@ class Backdrop:
         self._paint(colour, depth, view, np.array([-half, -half, 0.0]), self._floor, _FLOOR_SCALE)
         eye_height = -view[:3, 2] @ view[:3, 3]
         if self._table is not None and eye_height > self._top:
-            seen = self._paint(colour, depth, view, self._corner, self._texture, TABLE_SCALE)
+            seen = self._paint(colour, depth, view, self._corner, self._texture, self._table_scale)
             if seen is not None:
                 table, to_table = seen
         return Room(colour, depth, table, to_table)
@@ -147,9 +152,15 @@ def shade(room: Room, shadow: Picture, scale: float) -> Picture:
     return np.asarray(cv2.multiply(room.colour, cv2.merge([light] * 3), scale=1 / 255))
 
 
+def _table_scale(table: ObjectModel) -> float:
+    """Pixels per metre of the table's texture."""
+    return min(TABLE_SCALE, _LONGEST / max(table.size[:2]))
+
+
 def _table_texture(table: ObjectModel) -> Picture:
-    """Wood with a line each 10 cm of the base frame, and a frame round the edge."""
-    width, height = (round(edge * TABLE_SCALE) for edge in table.size[:2])
+    """Wood with a line each 10 cm, on a floor 50 cm, of the base frame, and a frame round it."""
+    scale = _table_scale(table)
+    width, height = (round(edge * scale) for edge in table.size[:2])
     noise = np.random.default_rng(5)
     grain = cv2.resize(
         noise.normal(0.0, 1.0, (max(2, height // 3), max(2, width // 60))).astype(np.float32),
@@ -161,10 +172,12 @@ def _table_texture(table: ObjectModel) -> Picture:
     left = table.position[0] - table.size[0] / 2
     low = table.position[1] - table.size[1] / 2
     line = tuple(int(value * 0.74) for value in wood)
-    for number in range(-20, 21):
-        x = round((number / 10 - left) * TABLE_SCALE)
-        y = round((number / 10 - low) * TABLE_SCALE)
-        thick = 2 if number % 5 == 0 else 1
+    apart = 0.1 if max(table.size[:2]) < _FLOOR_FROM else 0.5
+    farthest = round((max(map(abs, table.position[:2])) + max(table.size[:2])) / apart)
+    for number in range(-farthest, farthest + 1):
+        x = round((number * apart - left) * scale)
+        y = round((number * apart - low) * scale)
+        thick = 2 if number % (5 if apart == 0.1 else 2) == 0 else 1
         if 0 < x < width:
             cv2.line(picture, (x, 0), (x, height), line, thick, cv2.LINE_AA)
         if 0 < y < height:

@@ -16,7 +16,7 @@ class KinematicArm(SimulatedArm):
     The fingers go at the gripper's own speed and meet nothing. Things stay where they are put.
 
     Args:
-        model: Folder under ``app/robot/models``.
+        model: Name or file of the profile.
         robot: The robot's id on the link, for its description.
         dt: s; what passes in one step.
 
@@ -31,7 +31,7 @@ class KinematicArm(SimulatedArm):
         self._width = self._wanted_width = 0.0
         self._still: tuple[ObjectState, ...] = ()
         super().__init__(model, robot)
-        self.place(self.home, self.model.gripper.width, ())
+        self.place(self.home, self.description.gripper_max, ())
 
     def place(self, joints: Vector, gripper: float, objects: Sequence[ObjectState]) -> None:
         """Stand at ``joints`` (rad, shape (n,)), the fingers ``gripper`` (m) apart.
@@ -68,14 +68,15 @@ class KinematicArm(SimulatedArm):
 
     def grip(self, width: float, force: float | None = None) -> None:
         """Open or close the fingers towards ``width`` (m); there is nothing to press."""
-        self._wanted_width = min(max(width, 0.0), self.model.gripper.width)
+        self._wanted_width = min(max(width, 0.0), self.description.gripper_max)
 
     def brake(self, engaged: bool) -> None:
         """There is nothing to hold."""
 
     def step(self) -> None:
         """Let one step pass."""
-        most = 2 * self.model.gripper.speed * self._dt
+        gripper = self.model.gripper
+        most = 2 * gripper.speed * self._dt if gripper else 0.0
         self._width += float(np.clip(self._wanted_width - self._width, -most, most))
         self._pose()
 

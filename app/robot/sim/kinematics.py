@@ -171,6 +171,18 @@ class SerialKinematics:
         return result
 
 
+def fixed_pose(urdf: Path, base: str, tool: str) -> ToolPose:
+    """Where ``tool`` is in the frame of ``base``, with every joint between them at zero.
+
+    Raises:
+        CannotStart: the file has no chain from ``base`` to ``tool``.
+    """
+    pose = np.eye(4)
+    for joint in _chain(urdf, base, tool):
+        pose = pose @ origin_of(joint)
+    return ToolPose(pose[:3, 3].copy(), quaternion(pose))
+
+
 def quaternion(matrix: Matrix) -> Vector:
     """The unit quaternion (w, x, y, z; w >= 0) of a rotation matrix, 3x3 or larger.
 

@@ -53,10 +53,12 @@ class SimulatedProximity:
         self._body, joints, links = load_robot(self.client, assets.urdf_path)
         self._names = {index: name for name, index in links.items()}
         self._joints = [joints[joint.name] for joint in model.joints]
-        self._fingers = [joints[name] for name in model.gripper.fingers]
+        gripper = model.gripper
+        self._fingers = [joints[name] for name in gripper.fingers] if gripper else []
         parents, self._depths = self._tree(set(self._joints))
-        self._palm = parents[self._fingers[0]]
-        self._hand = {self._palm, *self._fingers}
+        # Without fingers there is no hand: nothing is held, and everything has to keep clear.
+        self._palm = parents[self._fingers[0]] if gripper else -1
+        self._hand = {self._palm, *self._fingers} if gripper else set()
         self._still = {index for index, depth in self._depths.items() if depth == 0}
         self._pairs = self._self_pairs(links, set(map(frozenset, model.never_touch)))
         self._fixed: dict[int, str] = {}

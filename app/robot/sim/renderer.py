@@ -19,10 +19,11 @@ import pybullet
 from app.errors import CannotStart
 from app.link.messages import ObjectState
 from app.robot.models import CameraModel, ModelAssets, ObjectModel, model_assets
+from app.robot.models.check import ROOM
 from app.robot.sim.backdrop import Backdrop, Picture, Room, shade
 from app.robot.sim.lens import Layer, Lens, Matrix, look_at
-from app.robot.sim.scenery import Stage, frame_of, link_outlines, thing_outline
-from app.robot.sim.shadow import SHADOW_SCALE, Shadow
+from app.robot.sim.scenery import Pose2D, Stage, frame_of, link_outlines, thing_outline
+from app.robot.sim.shadow import Shadow, shadow_scale
 
 _log = logging.getLogger(__name__)
 
@@ -34,7 +35,7 @@ class Renderer:
     """Draws the pictures of all cameras of a robot.
 
     Args:
-        model: Folder under ``app/robot/models``.
+        model: A profile: the name of one that comes with Farhand, or a file.
         hardware: Draw with EGL on a graphics card; default: where there is one.
 
     Raises:
@@ -54,7 +55,9 @@ class Renderer:
             for camera in self.model.cameras
         }
         table = next((thing for thing in self.model.objects if thing.grid), None)
-        self._shadow = Shadow(table, np.array(self.model.cameras[0].light)) if table else None
+        self._shadow: Shadow | None = None
+        if table is not None and self.model.cameras:
+            self._shadow = Shadow(table, np.array(self.model.cameras[0].light))
         self._throws = link_outlines(assets)
         self._stage = Stage(assets, lambda link: False, ())
         self._links = [self._stage.links[name] for name in self._throws]
@@ -64,7 +67,8 @@ class Renderer:
             if thing.mass > 0
         }
         self._darkness: Picture | None = None
-        self.update(self.model.pose(self.model.home), self.model.gripper.width, ())
+        gripper = self.model.gripper
+        self.update(self.model.pose(self.model.home), gripper.width if gripper else 0.0, ())
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -77,13 +81,18 @@ class Renderer:
         return self._draw_with.hardware
 
     def update(
-        self, joints: Iterable[float], gripper: float, objects: Iterable[ObjectState]
+        self,
+        joints: Iterable[float],
+        gripper: float,
+        objects: Iterable[ObjectState],
+        base: Pose2D | None = None,
     ) -> None:
         """Show the robot with its joints at ``joints`` (rad) and its fingers ``gripper`` m apart.
 
-        Things that are not among ``objects`` stay where they were.
+        A mobile base stands at ``base`` (m, m, rad). Things that are not among ``objects`` stay
+        where they were.
         """
-        self._joints, self._gripper = np.array(list(joints)), gripper
+        self._joints, self._gripper, self._base = np.array(list(joints)), gripper, base
         for thing in objects:
             if thing.name in self._movable:
                 w, x, y, z = thing.orientation
@@ -99,7 +108,7 @@ class Renderer:
         Raises:
             KeyError: there is no such camera.
         """
-        return self._views[name].draw(self._joints, self._gripper, self._shade())
+        return self._views[name].draw(self._joints, self._gripper, self._base, self._shade())
 
     def close(self) -> None:
         """Give the Bullet worlds back."""
@@ -110,7 +119,7 @@ class Renderer:
     def _shade(self) -> Picture | None:
         """The shadows of the newest state, drawn once for all cameras."""
         if self._darkness is None and self._shadow is not None:
-            self._stage.pose(self._joints, self._gripper)
+            self._stage.pose(self._joints, self._gripper, self._base)
             frames = self._stage.frames(self._links)
             parts = list(zip(self._throws.values(), frames, strict=True))
             parts += self._movable.values()
@@ -137,32 +146,41 @@ class _View:
         loose = [thing for thing in model.objects if thing.mass > 0]
         table = next((thing for thing in model.objects if thing.grid), None)
         self._backdrop = Backdrop(self._lens, table, fixed)
+        self._shadow_scale = shadow_scale(table) if table else 1.0
         self._still: Room | None = None
         self._view = np.eye(4)
-        base = model.base_link
-        stands_still = camera.link == base and whole is None
+        # What never moves before a camera that does not move: things, and a robot's first link.
+        in_room = camera.link == ROOM
+        still_link = None if model.base else model.base_link
+        stands_still = (in_room or camera.link == still_link) and whole is None
         if stands_still:
             self._view = self._looks_from(np.eye(4))
-            stage = Stage(assets, lambda link: link == base, fixed)
+            stage = Stage(assets, lambda link: link == still_link, fixed)
             self._still = self._draw_still(stage, table, fixed)
             stage.close()
         self.stage = whole or Stage(
             assets,
             lambda link: (
-                (not camera.shows or link in camera.shows) and not (stands_still and link == base)
+                (not camera.shows or link in camera.shows)
+                and not (stands_still and link == still_link)
             ),
             loose if stands_still else fixed + loose,
         )
-        self._link = self.stage.links[camera.link]
+        self._link = None if in_room else self.stage.links[camera.link]
 
-    def draw(self, joints: Matrix, gripper: float, darkness: Picture | None) -> Picture:
-        self.stage.pose(joints, gripper)
+    def draw(
+        self, joints: Matrix, gripper: float, base: Pose2D | None, darkness: Picture | None
+    ) -> Picture:
+        self.stage.pose(joints, gripper, base)
         if self._still is not None:
             room = self._still
         else:
-            self._view = self._looks_from(self.stage.frames([self._link])[0])
+            carrier = np.eye(4) if self._link is None else self.stage.frames([self._link])[0]
+            self._view = self._looks_from(carrier)
             room = self._backdrop.draw(self._view)
-        colour = room.colour.copy() if darkness is None else shade(room, darkness, SHADOW_SCALE)
+        colour = (
+            room.colour.copy() if darkness is None else shade(room, darkness, self._shadow_scale)
+        )
         room = room._replace(colour=colour)
         return self._painter.add(
             room, self.stage, self._lens, self._view, self._camera.light

@@ -11,8 +11,9 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
-from app.robot.models import ModelAssets, ObjectModel
-from app.robot.models.assets import read_stl, write_stl
+from app.robot.models import MobileBaseModel, ModelAssets, ObjectModel
+from app.robot.models.assets import read_stl
+from app.robot.models.meshes import drawn_urdf
 from app.robot.sim.kinematics import origin_of
 from app.robot.sim.lens import Matrix
 from app.robot.sim.shadow import outline
@@ -24,6 +25,10 @@ _SKIRT = 0.004
 
 _DETAIL = 0.006
 """m; smaller details of the meshes are not drawn: about a pixel and a half of the scene camera."""
+
+
+Pose2D = tuple[float, float, float]
+"""m, m, rad about Z, in the world."""
 
 
 class Stage:
@@ -49,12 +54,26 @@ class Stage:
         self._open = True
         prepare(self.client)
         self.body, self._joints, self.links = _load_visuals(self.client, assets, links)
-        self._driven = [self._joints[joint.name] for joint in assets.model.joints]
-        self._fingers = [self._joints[name] for name in assets.model.gripper.fingers]
+        model = assets.model
+        self._base = model.base
+        self._driven = [] if model.base else [self._joints[joint.name] for joint in model.joints]
+        fingers = model.gripper.fingers if model.gripper else ()
+        self._fingers = [self._joints[name] for name in fingers]
         self.things = {thing.name: add_visual(self.client, thing, own_shapes) for thing in things}
 
-    def pose(self, joints: Iterable[float], gripper: float) -> None:
-        """Put the robot's joints (rad) and its fingers (m between them) somewhere."""
+    def pose(self, joints: Iterable[float], gripper: float, base: Pose2D | None = None) -> None:
+        """Put the robot's joints (rad) and its fingers (m between them) somewhere.
+
+        A mobile base stands at ``base`` (m, m, rad), with its wheels turned as far as its joints
+        (m driven, rad turned) say.
+        """
+        if self._base is not None:
+            self._roll(self._base, *joints)
+            x, y, heading = base or (0.0, 0.0, 0.0)
+            pybullet.resetBasePositionAndOrientation(
+                self.body, (x, y, 0.0), upright(heading), physicsClientId=self.client
+            )
+            return
         half = gripper / 2
         for index, angle in zip(self._driven, joints, strict=True):
             pybullet.resetJointState(self.body, index, angle, physicsClientId=self.client)
@@ -71,7 +90,7 @@ class Stage:
             )
 
     def frames(self, links: list[int]) -> list[Matrix]:
-        """The 4x4 frames of links, base frame; -1 is the base link."""
+        """The 4x4 frames of links, in the world; -1 is the base link."""
         states = pybullet.getLinkStates(
             self.body,
             [link for link in links if link >= 0],
@@ -79,7 +98,23 @@ class Stage:
             physicsClientId=self.client,
         )
         moved = iter(frame_of(state[4], state[5]) for state in states)
-        return [next(moved) if link >= 0 else np.eye(4) for link in links]
+        first = (
+            frame_of(
+                *pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self.client)
+            )
+            if self._base is not None
+            else np.eye(4)
+        )
+        return [next(moved) if link >= 0 else first for link in links]
+
+    def _roll(self, base: MobileBaseModel, driven: float, turned: float) -> None:
+        """Turn the wheels as rolling without slip would have."""
+        for side, names in ((-1, base.left), (1, base.right)):
+            angle = (driven + side * turned * base.track / 2) / base.radius
+            for name in names:
+                pybullet.resetJointState(
+                    self.body, self._joints[name], angle, physicsClientId=self.client
+                )
 
     def close(self) -> None:
         """Give the world back. Closing twice does no harm."""
@@ -142,30 +177,6 @@ def add_visual(client: int, thing: ObjectModel, own_shapes: bool = True) -> int:
     )
 
 
-def coarsen(corners: NDArray[np.float32], cell: float) -> NDArray[np.float32]:
-    """A mesh (corners, shape (n, 3, 3)) without details smaller than ``cell`` (m).
-
-    Vertex clustering (Rossignac and Borrel 1993): corners in the same cell of a grid become their
-    mean, and triangles that lose a side are left out.
-    """
-    flat = corners.reshape(-1, 3)
-    _, which, count = np.unique(
-        np.floor(flat / cell + 0.5).astype(np.int32),
-        axis=0,
-        return_inverse=True,
-        return_counts=True,
-    )
-    which = which.reshape(-1)
-    means = np.zeros((len(count), 3))
-    np.add.at(means, which, flat)
-    means /= count[:, None]
-    triangles = which.reshape(-1, 3)
-    a, b, c = triangles.T
-    kept = triangles[(a != b) & (b != c) & (c != a)]
-    _, first = np.unique(np.sort(kept, axis=1), axis=0, return_index=True)
-    return np.asarray(means[kept[np.sort(first)]], np.float32)
-
-
 def frame_of(position: Sequence[float], quaternion: Sequence[float]) -> Matrix:
     """A 4x4 frame from Bullet's position and quaternion x, y, z, w."""
     frame = np.eye(4)
@@ -176,10 +187,11 @@ def frame_of(position: Sequence[float], quaternion: Sequence[float]) -> Matrix:
 
 def link_outlines(assets: ModelAssets) -> dict[str, Matrix]:
     """Outline points (m, shape (n, 3)) of each link's visual shapes, in the link's frame."""
-    root = ElementTree.parse(assets.urdf_path).getroot()
+    drawn = drawn_urdf(assets, _DETAIL)
+    root = ElementTree.parse(drawn).getroot()
     result = {}
     for link in root.findall("link"):
-        points = [_visual_points(visual, assets.urdf_path) for visual in link.findall("visual")]
+        points = [_visual_points(visual, drawn) for visual in link.findall("visual")]
         if points:
             result[link.get("name", "")] = outline(np.concatenate(points))
     return result
@@ -196,18 +208,15 @@ def _load_visuals(
     client: int, assets: ModelAssets, links: Callable[[str], bool]
 ) -> tuple[int, dict[str, int], dict[str, int]]:
     """Load the robot without collision shapes, and without the visuals of links not drawn."""
-    tree = ElementTree.parse(assets.urdf_path)
+    drawn = drawn_urdf(assets, _DETAIL)
+    tree = ElementTree.parse(drawn)
     for link in tree.getroot().findall("link"):
-        drawn = links(link.get("name", ""))
-        for part in list(link):
-            if part.tag == "collision" or (part.tag == "visual" and not drawn):
-                link.remove(part)
+        if not links(link.get("name", "")):
+            for visual in link.findall("visual"):
+                link.remove(visual)
+    for mesh in tree.getroot().iter("mesh"):
+        mesh.set("filename", str(drawn.parent / mesh.get("filename", "")))
     with tempfile.TemporaryDirectory(prefix="farhand-") as folder:
-        for number, mesh in enumerate(tree.getroot().iter("mesh")):
-            corners = read_stl(assets.urdf_path.parent / mesh.get("filename", ""))
-            coarse = Path(folder) / f"{number}.stl"
-            coarse.write_bytes(write_stl(coarsen(corners, _DETAIL)))
-            mesh.set("filename", str(coarse))
         path = Path(folder) / "visuals.urdf"
         tree.write(path)
         return load_robot(client, path)
@@ -222,7 +231,7 @@ def _visual_points(visual: ElementTree.Element, urdf: Path) -> Matrix:
     elif cylinder is not None:
         points = _cylinder(float(cylinder.get("radius", 0)), float(cylinder.get("length", 0)))
     elif mesh is not None:
-        points = _stl_points(urdf.parent / mesh.get("filename", ""))
+        points = read_stl(urdf.parent / mesh.get("filename", "")).reshape(-1, 3).astype(float)
     else:
         points = np.zeros((1, 3))
     return np.asarray(points @ frame[:3, :3].T + frame[:3, 3])
@@ -253,7 +262,3 @@ def _cylinder_triangles(radius: float, length: float, sides: int = 24) -> tuple[
         corners += [p + half, q + half, half, q - half, p - half, -half]
         normals += [up, up, up, -up, -up, -up]
     return np.array(corners), np.array(normals)
-
-
-def _stl_points(path: Path) -> Matrix:
-    return np.asarray(read_stl(path).reshape(-1, 3), dtype=np.float64)

@@ -13,7 +13,9 @@ from app.robot.sim.backdrop import Picture
 from app.robot.sim.lens import Matrix
 
 SHADOW_SCALE = 200
-"""Pixels of the shadow's picture per metre."""
+"""Pixels of the shadow's picture per metre, at most."""
+_LONGEST = 480
+"""Pixels of the shadow's picture along the table's longer edge, at most."""
 _STRENGTH = 105
 """How dark a full shadow is, of 255."""
 
@@ -29,11 +31,12 @@ class Shadow:
     def __init__(self, table: ObjectModel, light: Matrix) -> None:
         self._top = table.position[2] + table.size[2] / 2
         self._corner = np.array(table.position[:2]) - np.array(table.size[:2]) / 2
-        self._shape = (round(table.size[1] * SHADOW_SCALE), round(table.size[0] * SHADOW_SCALE))
+        self._scale = shadow_scale(table)
+        self._shape = (round(table.size[1] * self._scale), round(table.size[0] * self._scale))
         self._lean = np.asarray(light[:2]) / light[2]
 
     def draw(self, parts: list[Matrix]) -> Picture:
-        """The darkness (0 to 255, shape of the table at 5 mm a pixel) that parts throw.
+        """The darkness (0 to 255, shape of the table at :func:`shadow_scale`) that parts throw.
 
         Args:
             parts: The outline points (m, shape (n, 3), base frame) of each part.
@@ -44,10 +47,15 @@ class Shadow:
             if len(above) < 3:
                 continue
             height = above[:, 2:] - self._top
-            flat = (above[:, :2] - height * self._lean - self._corner) * SHADOW_SCALE
+            flat = (above[:, :2] - height * self._lean - self._corner) * self._scale
             hull = cv2.convexHull(np.asarray(flat * 16, dtype=np.int32))
             cv2.fillConvexPoly(dark, hull, _STRENGTH, cv2.LINE_AA, shift=4)
         return np.asarray(cv2.blur(cv2.blur(dark, (5, 5)), (5, 5)))
+
+
+def shadow_scale(table: ObjectModel) -> float:
+    """Pixels per metre of the shadow's picture: fewer on a floor than on a table."""
+    return min(SHADOW_SCALE, _LONGEST / max(table.size[:2]))
 
 
 def outline(vertices: NDArray[np.floating], directions: int = 40) -> Matrix:

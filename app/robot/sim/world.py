@@ -5,11 +5,13 @@ The only module that starts PyBullet; :mod:`app.robot.sim.arm` (physics) and
 """
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import pybullet
 
 from app.errors import CannotStart
+from app.link.messages import ObjectState
 from app.robot.models import ObjectModel
 
 STEPS_PER_SECOND = 240
@@ -35,8 +37,10 @@ def connect() -> int:
     return client
 
 
-def load_robot(client: int, urdf: Path) -> tuple[int, dict[str, int], dict[str, int]]:
-    """Load a robot fixed to the world.
+def load_robot(
+    client: int, urdf: Path, *, fixed: bool = True
+) -> tuple[int, dict[str, int], dict[str, int]]:
+    """Load a robot, fixed to the world unless told otherwise.
 
     Returns:
         Its body id, the joints by name, and the links by name (the base is -1).
@@ -44,12 +48,15 @@ def load_robot(client: int, urdf: Path) -> tuple[int, dict[str, int], dict[str, 
     Raises:
         CannotStart: Bullet cannot load the file.
     """
+    # Inertias of the file, not of the collision shapes.
+    flags = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_USE_MATERIAL_COLORS_FROM_MTL
+    if not fixed:  # wheels are round: as a hull of flat faces they would rumble
+        flags |= pybullet.URDF_USE_IMPLICIT_CYLINDER
     try:
         body = pybullet.loadURDF(
             str(urdf),
-            useFixedBase=True,
-            # Inertias of the file, not of the collision shapes.
-            flags=pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_USE_MATERIAL_COLORS_FROM_MTL,
+            useFixedBase=fixed,
+            flags=flags,
             physicsClientId=client,
         )
     except pybullet.error as error:
@@ -103,6 +110,24 @@ def add_object(client: int, thing: ObjectModel) -> int:
     return int(body)
 
 
+def object_state(client: int, name: str, body: int) -> ObjectState:
+    """Where a thing is."""
+    position, (x, y, z, w) = pybullet.getBasePositionAndOrientation(body, physicsClientId=client)
+    # Values from Bullet need no checking; this runs 240 times a second.
+    return ObjectState.model_construct(name=name, position=position, orientation=(w, x, y, z))
+
+
 def upright(turn: float) -> tuple[float, float, float, float]:
     """A turn about Z as Bullet's quaternion x, y, z, w."""
     return 0.0, 0.0, math.sin(turn / 2), math.cos(turn / 2)
+
+
+def reset_objects(client: int, things: Sequence[ObjectModel], bodies: dict[str, int]) -> None:
+    """Put the things of ``bodies`` (name to body id) back where the model has them, at rest."""
+    for thing in things:
+        if (body := bodies.get(thing.name)) is not None:
+            pybullet.resetBasePositionAndOrientation(
+                body, thing.position, upright(thing.turn), physicsClientId=client
+            )
+            nothing = (0.0, 0.0, 0.0)
+            pybullet.resetBaseVelocity(body, nothing, nothing, physicsClientId=client)

@@ -44,6 +44,7 @@ export function readout(element, store) {
         onclick: () => want(element, "reset-scene"),
     });
     part(element, "tools").append(putBack);
+    const place = fact("place", words.place);
     let rows = [];
     let drawnAt = 0;
     let timer = 0;
@@ -57,22 +58,33 @@ export function readout(element, store) {
             joints.replaceChildren(...rows.map(({ item }) => item));
         }
         const limits = (description && description.joints) || [];
+        const drives = Boolean(description && description.drives);
         rows.forEach(({ item, value, needle, low, high }, index) => {
-            const limit = limits[index];
+            const limit = drives ? null : limits[index]; // a base goes as far as its room
+            const slides = Boolean(limits[index]) && limits[index].unit === "m";
+            const end = (bound) => number(slides ? bound * 100 : degrees(bound), 0);
             const lower = limit ? limit.lower : -Math.PI;
             const upper = limit ? limit.upper : Math.PI;
             const share = (values[index] - lower) / (upper - lower);
             needle.style.left = `${(Math.min(1, Math.max(0, share)) * 100).toFixed(1)}%`;
-            setText(value, angle(values[index]));
-            setText(low, limit ? number(degrees(lower), 0) : "");
-            setText(high, limit ? number(degrees(upper), 0) : "");
+            needle.parentElement.hidden = drives;
+            setText(value, slides ? words.slideValue(number(values[index] * 100)) : angle(values[index]));
+            setText(low, limit ? end(lower) : "");
+            setText(high, limit ? end(upper) : "");
             const near = Boolean(limit) && (share < NEAR_LIMIT || share > 1 - NEAR_LIMIT);
             item.classList.toggle("is-near-limit", near);
         });
         setText(doing, robot && robot.action ? describeAction(robot.action, description) : words.nothing);
         const width = robot && robot.gripper;
         setText(gripper, Number.isFinite(width) ? words.gripperOpen(number(width * 1000, 0)) : "–");
-        const position = robot && robot.tool && robot.tool.position;
+        gripper.parentElement.hidden = Boolean(description) && description.gripper_max === 0;
+        const base = robot && robot.base;
+        place.parentElement.hidden = !Array.isArray(base);
+        if (Array.isArray(base)) {
+            const [x, y, heading] = base;
+            setText(place, words.placeValue(short(x * 100, 0), short(y * 100, 0), short(degrees(heading), 0)));
+        }
+        const position = robot && !base && robot.tool && robot.tool.position;
         tool.parentElement.hidden = !Array.isArray(position);
         if (Array.isArray(position)) {
             setText(tool, words.toolValue(...position.map((metres) => short(metres * 100, 0))));

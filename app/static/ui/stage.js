@@ -19,8 +19,9 @@ class CameraView {
         this.canvas = el("canvas", { role: "img", "aria-label": label, width: 320, height: 240 });
         this.age = el("span", { class: "age", data: { part: "age" } });
         this.empty = el("p", { class: "view-empty", text: texts.stage.noPicture });
-        const title = el("p", { class: "view-title" }, el("span", { text: label }), this.age);
-        const cover = el("button", {
+        this.label = el("span", { text: label });
+        const title = el("p", { class: "view-title" }, this.label, this.age);
+        this.cover = el("button", {
             type: "button",
             class: "view-cover",
             "aria-label": texts.stage.enlarge(label),
@@ -39,11 +40,18 @@ class CameraView {
             this.canvas,
             this.empty,
             title,
-            cover,
+            this.cover,
             el("div", { class: "view-tools" }, swapButton),
         );
         this.context = this.canvas.getContext("2d");
         feed.addEventListener("picture", (event) => this.#draw(event.detail.bitmap));
+    }
+
+    /** What the robot's profile calls this camera. */
+    rename(label) {
+        setText(this.label, label);
+        this.canvas.setAttribute("aria-label", label);
+        this.cover.setAttribute("aria-label", texts.stage.enlarge(label));
     }
 
     want(visible) {
@@ -230,6 +238,12 @@ export function stage(element, store, { feeds, onFrame, memory }) {
         for (const camera of cameras) camera.want(awake && signedIn && camera.visible);
         if (awake) view3d.load();
     };
+    store.watch(["description"], ({ description }) => {
+        for (const { name, title } of (description && description.cameras) || []) {
+            const camera = cameras.find((candidate) => candidate.name === name);
+            if (camera && title) camera.rename(title);
+        }
+    });
     const seen = new IntersectionObserver(
         (entries) => {
             for (const entry of entries) {

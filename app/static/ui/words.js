@@ -69,13 +69,25 @@ function gripper(action, description) {
 
 const WIDEST_GRIPPER = 0.08;
 
+/** Whether a joint (from 1) moves in metres: it slides, or drives. */
+function slides(joint, description) {
+    const known = description && description.joints && description.joints[joint - 1];
+    return Boolean(known) && known.unit === "m";
+}
+
 function simple(action, description) {
     switch (action && action.type) {
         case "jog_cartesian":
             return cartesian(action);
         case "jog_joint":
+            if (slides(action.joint, description)) {
+                return words.slideJoint(action.joint, short(action.velocity * 100));
+            }
             return words.jogJoint(action.joint, short(degrees(action.velocity)));
         case "turn_joint":
+            if (slides(action.joint, description)) {
+                return words.slideJointBy(action.joint, short(action.angle * 100));
+            }
             return words.turnJoint(action.joint, short(degrees(action.angle)));
         case "pose":
             return words.pose(action.name);

@@ -203,7 +203,7 @@ def test_pybullet_without_numpy_is_refused(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_an_unknown_model_is_named() -> None:
-    with pytest.raises(CannotStart, match="no robot model 'r2d2'; there are: puma560"):
+    with pytest.raises(CannotStart, match="no robot model 'r2d2'; there are: franka_panda, "):
         SimulatedArm("r2d2")
 
 
