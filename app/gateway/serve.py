@@ -23,6 +23,7 @@ from app.config import Settings
 from app.errors import CannotStart
 from app.gateway.app import create_app
 from app.gateway.auth import is_loopback
+from app.gateway.front import SecureFront
 from app.gateway.greeting import greet
 from app.gateway.machine import machine_names
 from app.gateway.roles import ROUTES
@@ -152,6 +153,26 @@ class Server(uvicorn.Server):
     def capture_signals(self) -> Iterator[None]:
         """Leave the signals alone: :func:`serve` has them from before the start to the end."""
         yield
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Listen as uvicorn does; over HTTPS by a front that answers plain HTTP, too."""
+        context = self.config.ssl
+        if context is None or not sockets:
+            await super().startup(sockets)
+            return
+        await super().startup([])
+
+        def protocol() -> asyncio.Protocol:
+            # As uvicorn makes it for its own listeners.
+            made: asyncio.Protocol = self.config.http_protocol_class(  # type: ignore[call-arg]
+                config=self.config,
+                server_state=self.server_state,
+                app_state=self.lifespan.state,
+            )
+            return made
+
+        for listener in sockets:
+            self.servers.append(SecureFront(listener, context, protocol))  # type: ignore[arg-type]
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """End endless answers first, then as uvicorn does."""

@@ -22,6 +22,7 @@ from pydantic import SecretStr, ValidationError
 
 from app.config import Settings
 from app.errors import CannotStart
+from app.gateway.auth import is_loopback
 from app.gateway.greeting import address, greet, link
 from app.gateway.serve import bind, check_transport, keep_certificate, local_authority
 from app.gateway.tls import FOLDER, read_authority
@@ -207,8 +208,47 @@ def test_off_loopback_a_certificate_is_made(folder: Path, node: StandIn) -> None
             assert client.get(f"https://localhost:{port}/trust/ca.crt").content == authority.der
             foreign = client.get(f"https://localhost:{port}/api/health", headers={"Host": "evil"})
             assert foreign.status_code == 400
+            # Who forgets the "https://" is told, and nothing said in the clear is used.
+            plain = client.get(f"http://127.0.0.1:{port}/", params={"token": token})
+            assert plain.status_code == 400
+            assert f"https://127.0.0.1:{port}/" in plain.text
+            assert token not in plain.text
+            assert "set-cookie" not in plain.headers
     # The next start uses the same.
     assert read_authority(data / FOLDER) == authority
+
+
+def test_only_the_own_port_is_reached_from_outside(folder: Path) -> None:
+    """Node, camera process and viser listen on loopback or on files alone."""
+    with program(folder / "data", host="0.0.0.0") as process:
+        url, token = read_link(process)
+        port = int(url.rpartition(":")[2])
+        bearer = {"Authorization": f"Bearer {token}"}
+        authority = read_authority(folder / "data" / FOLDER)
+        assert authority is not None
+        trust = ssl.create_default_context(cadata=authority.pem.decode())
+        with httpx.Client(headers=bearer, verify=trust, trust_env=False, timeout=60) as client:
+            here = f"https://localhost:{port}"
+            # All parts are up: the node with its cameras, and the 3D view.
+            for path in ("api/cameras/wrist.jpg", "viser/"):
+                wait_for(
+                    lambda path=path: client.get(f"{here}/{path}").status_code == 200, path, 60
+                )
+            family = [psutil.Process(process.pid)]
+            family += family[0].children(recursive=True)
+            assert len(family) >= 3
+            listening = [
+                connection.laddr
+                for each in family
+                for connection in each.net_connections(kind="inet")
+                if connection.status == psutil.CONN_LISTEN or connection.type == socket.SOCK_DGRAM
+            ]
+    loopback = [address for address in listening if is_loopback(address.ip)]
+    assert [(address.ip, address.port) for address in listening if address not in loopback] == [
+        ("0.0.0.0", port)
+    ]
+    # viser's, which the test would have seen anywhere else.
+    assert len(loopback) == 1
 
 
 def test_a_certificate_is_made_only_where_none_is_given(tmp_path: Path) -> None:
