@@ -188,9 +188,9 @@ class Gatekeeper:
         """
         digest = sha256(secret)
         if not self.throttle.knows(client, digest):
-            self.throttle.check(client)
+            self.throttle.check(client, digest)
         if self._tokens.by_secret(secret) is None:
-            self.throttle.failed(client)
+            self.throttle.failed(client, digest)
             return None
         self.throttle.succeeded(client, digest)
         return self.set_cookie_header(secret)
@@ -219,10 +219,10 @@ class Gatekeeper:
     def _bearer(self, secret: str, client: str) -> Identity | None:
         digest = sha256(secret)
         if not self.throttle.knows(client, digest):
-            self.throttle.check(client)
+            self.throttle.check(client, digest)
         token = self._tokens.by_secret(secret)
         if token is None:
-            self.throttle.failed(client)
+            self.throttle.failed(client, digest)
             return None
         self.throttle.succeeded(client, digest)
         return Identity(token.id, token.role, "bearer")

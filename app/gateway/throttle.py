@@ -25,10 +25,13 @@ class TooManyGuesses(RequestError):
 
 
 class _Own:
-    """Wrong tokens of one address. A pause forgets them; guessing on makes the pause longer."""
+    """Wrong tokens of one address, as hashes, at most :data:`ADDRESS_TRIES`.
+
+    A pause forgets them; guessing on makes the pause longer.
+    """
 
     def __init__(self) -> None:
-        self.count = 0
+        self.wrong: set[str] = set()
         self.last = 0.0
 
 
@@ -49,8 +52,11 @@ class Throttle:
         self._addresses: OrderedDict[str, _Own] = OrderedDict()
         self._known: OrderedDict[tuple[str, str], None] = OrderedDict()
 
-    def check(self, address: str) -> None:
+    def check(self, address: str, digest: str) -> None:
         """Refuse an address that has guessed too often.
+
+        The same wrong token once more is no guess: a program that was not told of its end goes on
+        with it, and learns what it knew.
 
         Raises:
             TooManyGuesses: with the seconds to wait.
@@ -59,20 +65,25 @@ class Throttle:
         self._left = min(ALL_TRIES, self._left + (now - self._refilled) / ALL_REFILL_S)
         self._refilled = now
         own = self._addresses.get(_group(address))
-        if own is not None and now - own.last >= PAUSE_S:
-            own.count = 0
-        if own is not None and own.count >= ADDRESS_TRIES:
-            own.last = now
-            raise _too_many(int(PAUSE_S))
+        if own is not None:
+            if digest in own.wrong:
+                return
+            if now - own.last >= PAUSE_S:
+                own.wrong.clear()
+            if len(own.wrong) >= ADDRESS_TRIES:
+                own.last = now
+                raise _too_many(int(PAUSE_S))
         if self._left < 1.0:
             raise _too_many(1)
 
-    def failed(self, address: str) -> None:
-        """A wrong token came from ``address``."""
+    def failed(self, address: str, digest: str) -> None:
+        """The token with this hash was wrong, from ``address``."""
         group = _group(address)
         own = self._addresses.pop(group, None) or _Own()
         self._addresses[group] = own
-        own.count += 1
+        if digest in own.wrong:
+            return
+        own.wrong.add(digest)
         own.last = self._clock()
         self._left = max(0.0, self._left - 1.0)
         if len(self._addresses) > MAX_KEPT:
