@@ -84,6 +84,11 @@ class BinariseSettings(_Section):
         description="learned mode: mean share of hand over the mask; with less there is no hand. "
         "Nine in ten true hands in rooms have 0.8 or more, most mistaken ones less than this",
     )
+    fill_holes: Fraction = Field(
+        default=0.015,
+        description="threshold: holes smaller than this part of the hand are filled; 0 leaves them "
+        "(paper)",
+    )
     min_area: Fraction = Field(default=0.005, description="smallest hand, part of the picture")
     max_area: Fraction = Field(default=0.8, description="largest hand, part of the picture")
 
@@ -312,6 +317,52 @@ class RobotSettings(_Section):
     )
 
 
+class ClearanceSettings(_Section):
+    """How near an arm may come to things and to itself, and how hard it may touch."""
+
+    slow: float = Field(
+        default=0.10, gt=0.0, le=1.0, description="m; nearer than this, coming nearer is slowed"
+    )
+    stop: float = Field(
+        default=0.020, ge=0.0, le=0.5, description="m; no link of the arm comes nearer to a thing"
+    )
+    stop_itself: float = Field(
+        default=0.010, ge=0.0, le=0.5, description="m; no link comes nearer to another"
+    )
+    stop_hand: float = Field(
+        default=0.004,
+        ge=0.0,
+        le=0.5,
+        description="m; the fingers and what carries them come no nearer to what is fixed. A thing "
+        "on a table is grasped near its middle, and with the arm's own distance the fingers would "
+        "not reach below 20 mm; four times the 1 mm that a servo lags in a slow approach",
+    )
+    stop_held: float = Field(
+        default=0.002,
+        ge=0.0,
+        le=0.5,
+        description="m; what is held comes no nearer to other things: from here it is set down by "
+        "letting go, and drops no farther than a book's cover is thick",
+    )
+    slow_workspace: float = Field(
+        default=0.05,
+        gt=0.0,
+        le=1.0,
+        description="m; nearer than this to the edge of its box, the tool is slowed",
+    )
+    slowest: float = Field(
+        default=0.03, gt=0.0, le=1.0, description="part of the speed that slowing always leaves"
+    )
+    contact_force: float = Field(
+        default=50.0,
+        gt=0.0,
+        le=1000.0,
+        description="N; a contact that presses harder is a collision (S1). Below the 65 N that "
+        "ISO/TS 15066 allows at the most sensitive part of a body (the face), and above the 25 N "
+        "that the fingers press with when they push a light thing over a table",
+    )
+
+
 class ArmMotionSettings(_Section):
     """How a robot node moves its arm, in parts of the arm's own limits.
 
@@ -338,6 +389,16 @@ class ArmMotionSettings(_Section):
         le=1.0,
         description="s from no acceleration to the whole of it, in straight motion",
     )
+    creep_s: float = Field(
+        default=0.6,
+        ge=0.0,
+        le=5.0,
+        description="s; straight motion while a gesture is held begins so long at a crawl, so that "
+        "who shows it briefly moves the tool by a little",
+    )
+    creep: float = Field(
+        default=0.25, ge=0.01, le=1.0, description="part of the speed asked for at that crawl"
+    )
     slow_below: float = Field(
         default=0.10,
         gt=0.0,
@@ -349,6 +410,10 @@ class ArmMotionSettings(_Section):
         gt=0.0,
         le=1.0,
         description="rad between commanded and measured joint at which the arm counts as blocked",
+    )
+    clearance: ClearanceSettings = ClearanceSettings()
+    planning_s: float = Field(
+        default=8.0, gt=0.0, le=60.0, description="s; longest search for a way round things"
     )
 
 
@@ -407,6 +472,20 @@ class GatewaySettings(_Section):
         le=10_000,
         description="a frame whose sender had seen no newer server tick than this moves nothing",
     )
+    frozen_ms: int = Field(
+        default=500,
+        ge=0,
+        le=10_000,
+        description="a live webcam whose pixels stay the same for this long is frozen: the arm "
+        "holds still; 0 never is",
+    )
+    picture_age_ms: int = Field(
+        default=1000,
+        ge=0,
+        le=60_000,
+        description="who drives by a picture of the robot older than this, and says so, cannot see "
+        "it: the arm holds still; 0 never",
+    )
     workers: int = Field(default=4, ge=1, le=64, description="threads for image work")
     robot_rate_hz: float = Field(
         default=20.0, ge=10.0, le=60.0, description="robot messages a second to every session"
@@ -415,7 +494,11 @@ class GatewaySettings(_Section):
         default=10.0, ge=1.0, le=30.0, description="masks and templates a second to a detail view"
     )
     robot_silence_ms: int = Field(
-        default=250, ge=100, le=5000, description="no state for this long is shown as a fault"
+        default=200,
+        ge=100,
+        le=5000,
+        description="no state for this long is shown as a fault; with the wait for the next robot "
+        "message a hung node is shown within 300 ms",
     )
     robot_hung_ms: int = Field(
         default=1500,

@@ -1,6 +1,8 @@
 """A real browser that drives: Chromium, the page, a fake webcam that plays the drawn hand."""
 
+import contextlib
 import shutil
+import signal
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -50,8 +52,9 @@ def browser(server: Server, video: Path, *, view_3d: bool = False) -> Iterator[P
             chromium.close()
 
 
-def kill_browser() -> None:
-    """Kill every Chromium that this process started, at once and without a word."""
+def signal_browser(number: signal.Signals) -> None:
+    """Send a signal to every Chromium that this process started, without a word before."""
     for child in psutil.Process().children(recursive=True):
         if "chrom" in child.name():
-            child.kill()
+            with contextlib.suppress(psutil.NoSuchProcess):
+                child.send_signal(number)

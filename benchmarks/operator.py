@@ -1,12 +1,14 @@
 """A scripted operator: sends pictures over the operator WebSocket as the page does."""
 
 import asyncio
+import contextlib
 import json
 import time
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Iterable
 from typing import Any, Self
 
 from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
 
 from app.link.header import FrameHeader
 
@@ -49,7 +51,12 @@ class Operator:
 
     async def _read(self) -> None:
         assert self._socket is not None
-        async for raw in self._socket:
+        # A server that was killed says no farewell.
+        with contextlib.suppress(ConnectionClosed):
+            await self._read_all(self._socket)
+
+    async def _read_all(self, socket: ClientConnection) -> None:
+        async for raw in socket:
             message = json.loads(raw)
             message["received"] = time.monotonic()
             self.tick = max(self.tick, message.get("tick") or 0)
@@ -89,15 +96,20 @@ class Operator:
         await self.say("arm")
         await self.wait_for(lambda: self.robot.get("armed"))
 
-    async def show(self, jpeg: bytes) -> int:
-        """Send one picture, or skip it when two are under way. Returns its number, or -1."""
+    async def show(self, jpeg: bytes, *, flood: bool = False) -> int:
+        """Send one picture, or skip it when two are under way. Returns its number, or -1.
+
+        Args:
+            jpeg: The picture.
+            flood: Send it however many are under way, as no client should.
+        """
         assert self._socket is not None
         now = time.monotonic()
         # A frame that was replaced by a newer one on the server is never answered.
         for number, sent in list(self._in_flight.items()):
             if now - sent > 0.5:
                 del self._in_flight[number]
-        if len(self._in_flight) >= MAX_IN_FLIGHT:
+        if len(self._in_flight) >= MAX_IN_FLIGHT and not flood:
             self.skipped += 1
             return -1
         self._sequence += 1
@@ -108,16 +120,29 @@ class Operator:
 
     async def play(
         self,
-        pictures: Sequence[bytes],
+        pictures: Iterable[bytes],
         rate: float = 30.0,
         at_each: Callable[[int, int], Awaitable[None]] | None = None,
+        *,
+        until: Callable[[], object] = lambda: False,
+        flood: bool = False,
     ) -> None:
-        """Show the pictures at ``rate`` a second; ``at_each(index, seq)`` is awaited after each."""
+        """Show pictures one after another.
+
+        Args:
+            pictures: JPEGs; may be without end.
+            rate: How many a second.
+            at_each: ``at_each(index, seq)`` is awaited after each.
+            until: Ends before the pictures do when this is true.
+            flood: Send each, however many are under way.
+        """
         start = time.monotonic()
         for index, picture in enumerate(pictures):
             delay = start + index / rate - time.monotonic()
             if delay > 0:
                 await asyncio.sleep(delay)
-            number = await self.show(picture)
+            if until():
+                return
+            number = await self.show(picture, flood=flood)
             if at_each is not None:
                 await at_each(index, number)

@@ -171,7 +171,7 @@ def draw_two_looks() -> None:
         row(
             tile(picture, "a hand far away", *box),
             tile(np.asarray(first * 255, np.uint8), "first look: the whole picture", *box),
-            tile(framed, "4.6 palm radii about the palm", *box),
+            tile(framed, "the part round the palm", *box),
             tile(np.asarray(second * 255, np.uint8), "second look: this part", *box),
             tile(shaded(picture, masked.mask), "the mask", *box),
         ),

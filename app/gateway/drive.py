@@ -4,12 +4,22 @@ from dataclasses import dataclass
 
 from app.gateway.numbers import Counter
 from app.link.actions import Action, Sequence, Stop, TurnJoint
-from app.link.messages import Command, State, StopRequest
+from app.link.messages import Command, Doubt, State, StopRequest
+from app.pipeline.types import Cause
 
 REST_S = 0.5
 """Frames must show no gesture for so long before the same gesture surely is a new showing."""
 LONGEST_GAP_S = 0.25
 """Frames farther apart than this leave open what was shown between them."""
+DOUBTS: dict[Cause, Doubt] = {
+    "no_hand": "no_hand",
+    "unknown_hand": "unknown_hand",
+    "two_hands": "two_hands",
+    "low_margin": "low_margin",
+}
+"""What the node is told about a frame that shows no gesture. A hand that moves is no doubt: it may
+be on its way to the next gesture."""
+FROZEN = "the webcam picture is frozen"
 _AGAIN = "show no gesture for half a second, then a new one"
 _TOO_EARLY = "this gesture began before the robot was ready: let go and show it again"
 _REPEATED = f"this was done already: {_AGAIN}"
@@ -33,6 +43,10 @@ class Situation:
     """Newest state of the robot; None when it is not connected."""
     stale: str | None = None
     """Why the frame is too old to move anything, in plain words."""
+    unseen: str | None = None
+    """Why the operator cannot see the robot, in plain words."""
+    scale: float = 1.0
+    """Part of the ordinary speed that is wanted."""
     at: float = 0.0
     """When the frame arrived, s, monotonic."""
 
@@ -44,6 +58,8 @@ class Decision:
     command: Command | None = None
     stop: StopRequest | None = None
     reason: str | None = None
+    doubt: Doubt | None = None
+    """Why the arm is to hold still, if anything moves."""
 
 
 class Driver:
@@ -85,20 +101,31 @@ class Driver:
         self._changed = True
         self._none_since = None
 
-    def decide(self, gesture: str | None, frame: int, situation: Situation) -> Decision:
+    def decide(
+        self,
+        gesture: str | None,
+        frame: int,
+        situation: Situation,
+        *,
+        cause: Cause | None = None,
+        frozen: bool = False,
+    ) -> Decision:
         """Decide on one processed frame.
 
         Args:
             gesture: Name of the gesture that is held, after N-of-M agreement.
             frame: The frame's sequence number.
             situation: As of the frame's arrival.
+            cause: Why the frame itself shows no gesture. Counts only when none is held any more.
+            frozen: The webcam has been sending the same picture. A gesture in it counts no more.
         """
+        blind = FROZEN if frozen else situation.unseen
         begins = gesture is not None and gesture != self._gesture
         self._gesture = gesture
         action = None if gesture is None else situation.actions.get(gesture)
         rested = self._rested(gesture, situation.at)
         self._changed = self._changed and not rested
-        reason = self._obstacle(situation)
+        reason = self._obstacle(situation) or blind
         if begins:
             self._begin(gesture, action, rested=rested, ready=reason is None)
         elif reason is not None and not situation.stale:
@@ -118,6 +145,11 @@ class Driver:
             reason = self._barred
         if gesture is None or reason is not None:
             action = None
+        doubt: Doubt | None = None
+        if gesture is None:
+            doubt = None if cause is None else DOUBTS.get(cause)
+        elif action is None and blind is not None:
+            doubt = "frozen" if frozen else "stale_picture"
         if situation.stale or situation.lease is None or situation.state is None:
             return Decision(stop=stop, reason=reason if gesture else situation.stale)
         self._sequence += 1
@@ -130,8 +162,10 @@ class Driver:
             gesture=gesture,
             action=action,
             reason=reason[:300] if gesture and reason else None,
+            doubt=doubt,
+            scale=situation.scale,
         )
-        return Decision(command=command, stop=stop, reason=reason if gesture else None)
+        return Decision(command=command, stop=stop, reason=reason if gesture else None, doubt=doubt)
 
     def _begin(
         self, gesture: str | None, action: Action | None, *, rested: bool, ready: bool

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from app.config import Settings
 from app.gateway.drive import Decision, Driver, Situation
+from app.gateway.eyes import FrozenCamera
 from app.gateway.gallery import Enrolled
 from app.gateway.numbers import Counter, tick_ms
 from app.gateway.robot_port import RobotPort
@@ -60,6 +61,7 @@ class FrameWorker:
         self._pipeline = Pipeline(settings.pipeline, enrolled.matcher)
         self._version = enrolled.version
         self._driver = Driver(session, holds)
+        self._frozen = FrozenCamera(settings.gateway.frozen_ms)
 
     def run(self, job: FrameJob) -> FrameDone:
         """Process a frame and command the robot.
@@ -73,7 +75,10 @@ class FrameWorker:
             self._version = job.enrolled.version
             self._driver.gestures_changed()
         result = self._pipeline(job.jpeg, seq=job.seq, now=job.arrived)
-        decision = self._driver.decide(result.gesture, job.seq, job.situation)
+        frozen = self._frozen(result.digest, job.arrived)
+        decision = self._driver.decide(
+            result.gesture, job.seq, job.situation, cause=result.cause, frozen=frozen
+        )
         if decision.command is not None:
             self._robot.send(decision.command)
         ended = time.monotonic()
@@ -84,6 +89,7 @@ class FrameWorker:
         frame["timing_ms"] = {stage: round(value, 3) for stage, value in timing.items()}
         frame["gesture"] = result.gesture
         frame["reason"] = decision.reason or result.reason
+        frame["doubt"] = decision.doubt
         if job.detail:
             frame["detail"] = self._detail(result, job.enrolled)
         messages = [frame]

@@ -148,6 +148,16 @@ class Hub:
         # What is told next should show it already.
         await asyncio.to_thread(self.robot.wait_newer, CONFIRM_RESET_S)
 
+    async def reset_scene(self, source: str) -> None:
+        """Put every movable thing back where it was at first.
+
+        Raises:
+            LeaseRefused: the robot is armed, or has not come to rest.
+            RobotUnavailable: no answer came in time.
+        """
+        check_reply(await self.ask(LeaseRequest(kind="reset_scene", holder=source[:80])))
+        await asyncio.to_thread(self.robot.wait_newer, CONFIRM_RESET_S)
+
     async def gallery_changed(self) -> None:
         """Read the gestures again if they changed, and tell every session."""
         await asyncio.to_thread(self.gallery.refresh)

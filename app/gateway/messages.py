@@ -23,6 +23,8 @@ CLIENT_MESSAGES = (
     "stop",
     "reset",
     "view",
+    "speed",
+    "picture",
     "ping",
 )
 SERVER_MESSAGES = ("hello", "frame", "gesture", "robot", "gallery", "pong", "error")
@@ -53,6 +55,21 @@ class View(_ClientMessage):
     detail: bool
 
 
+class Speed(_ClientMessage):
+    """The part of the ordinary speed at which this session wants to drive."""
+
+    type: Literal["speed"]
+    scale: float = Field(ge=0.05, le=1.0)
+
+
+class Picture(_ClientMessage):
+    """The newest picture of a robot camera that this client has shown."""
+
+    type: Literal["picture"]
+    camera: Literal["wrist", "scene"]
+    tick: int = Field(ge=0, description="of the state that the picture shows, ms")
+
+
 class Ping(_ClientMessage):
     """Answered with ``pong``."""
 
@@ -60,7 +77,9 @@ class Ping(_ClientMessage):
     t: float
 
 
-ClientMessage = Annotated[TakeControl | Plain | View | Ping, Field(discriminator="type")]
+ClientMessage = Annotated[
+    TakeControl | Plain | View | Speed | Picture | Ping, Field(discriminator="type")
+]
 _CLIENT_MESSAGE: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)
 
 

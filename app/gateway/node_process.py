@@ -23,6 +23,9 @@ BACK_OFF_S = (0.2, 0.5, 1.0, 2.0, 5.0)
 HEALTHY_S = 10.0
 """A node that ran this long starts again without having its crash held against it."""
 CHECK_S = 0.05
+PAUSED_S = 0.5
+"""A check that comes so late was not made in time: the gateway itself was stopped or starved, and
+may not have read yet what the node said meanwhile."""
 STOP_WAIT_S = 1.5
 """After asking the node to end, and before killing it."""
 _SECRETS = ("FARHAND_TOKEN",)
@@ -137,7 +140,13 @@ class NodeProcess:
 
     def _watch(self) -> str | None:
         """Wait until the child has to be started again, and say why; None when we end."""
+        listening_since = checked = time.monotonic()
         while not self._ending.wait(CHECK_S):
+            now = time.monotonic()
+            if now - checked > PAUSED_S:
+                log.warning("the gateway itself was held up for %.1f s", now - checked)
+                listening_since = now
+            checked = now
             process = self._process
             if process is None:
                 return self._fault or "the robot node cannot be started"
@@ -146,10 +155,9 @@ class NodeProcess:
                 # What it left behind, such as its camera process, is of its process group.
                 self._signal(signal.SIGKILL)
                 return f"robot node crashed ({describe_exit(code)})"
-            now = time.monotonic()
             if self._has_spoken():
                 self._fault = None
-                silence = now - (self._last_word() or now)
+                silence = now - max(self._last_word() or now, listening_since)
                 if silence > self._hung_s:
                     self._kill()
                     return f"robot node hung (no state for {silence:.1f} s)"

@@ -1,4 +1,4 @@
-"""REST: robots, the stop and its reset."""
+"""REST: robots, the stop and its reset, and the things around the robot."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -58,4 +58,19 @@ async def reset_robot(request: Request, id: str) -> dict[str, Any]:
     """Leave the latched stop. The robot is disarmed afterwards."""
     hub, robot = _robot(request, id)
     await hub.reset("rest")
+    return robot_summary(robot)
+
+
+@router.post(
+    "/{id}/scene/reset",
+    summary="Put every movable thing back",
+    responses={**_AWAY, 409: {"description": "the robot is armed, or still moves"}},
+)
+async def reset_scene(request: Request, id: str) -> dict[str, Any]:
+    """Put every thing that can move back where it was at first.
+
+    Needs no control, but a robot that is disarmed or stopped, and stands.
+    """
+    hub, robot = _robot(request, id)
+    await hub.reset_scene("rest")
     return robot_summary(robot)

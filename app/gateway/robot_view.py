@@ -5,6 +5,7 @@ from typing import Any
 from app.gateway.numbers import tick_ms
 from app.gateway.robot_port import RobotPort
 from app.link.actions import ACTION
+from app.link.messages import Clearance
 
 
 def robot_message(robot: RobotPort) -> dict[str, Any]:
@@ -46,10 +47,27 @@ def robot_message(robot: RobotPort) -> dict[str, Any]:
             "action": None
             if state.action is None
             else ACTION.dump_python(state.action, mode="json", exclude_none=True),
+            "doubt": state.doubt,
             "limits": list(state.limits),
+            "scale": state.scale,
+            "commanded": [round(joint, 6) for joint in state.commanded],
+            "clearance": _clearance(state.clearance),
+            "transitions": [step.model_dump() for step in state.transitions],
+            "dropped": state.dropped,
             "loop": None if state.loop is None else state.loop.model_dump(),
         }
     return message
+
+
+def _clearance(clearance: Clearance | None) -> dict[str, Any] | None:
+    if clearance is None:
+        return None
+    return {
+        "distance": round(clearance.distance, 4),
+        "link": clearance.link,
+        "thing": clearance.thing,
+        "itself": clearance.itself,
+    }
 
 
 def robot_summary(robot: RobotPort) -> dict[str, Any]:

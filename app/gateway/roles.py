@@ -53,6 +53,7 @@ ROUTES: dict[str, Access] = {
     "WEBSOCKET /viser/": "signed in",
     # Driving and teaching
     "POST /api/robots/{id}/reset": "operator",
+    "POST /api/robots/{id}/scene/reset": "operator",
     "POST /api/recognise": "operator",
     "POST /api/gestures": "operator",
     "POST /api/gestures/check": "operator",
@@ -68,6 +69,8 @@ MESSAGES: dict[str, Access] = {
     "stop": "signed in",
     "view": "signed in",
     "ping": "signed in",
+    "speed": "signed in",  # of this session's own driving: moves nothing by itself
+    "picture": "signed in",
     FRAME: "operator",
     "take_control": "operator",
     "release_control": "operator",

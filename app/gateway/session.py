@@ -11,12 +11,15 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from app.errors import FarhandError, FrameRefused, NotAllowed, RequestError
 from app.gateway.drive import Situation
 from app.gateway.errors import INTERNAL_MESSAGE
+from app.gateway.eyes import PictureAge
 from app.gateway.frame_age import FrameAge
 from app.gateway.frame_job import FrameDone, FrameJob, FrameWorker
 from app.gateway.lease_keeper import LeaseKeeper
 from app.gateway.messages import (
     ClientMessage,
+    Picture,
     Ping,
+    Speed,
     TakeControl,
     View,
     error_message,
@@ -24,6 +27,7 @@ from app.gateway.messages import (
 )
 from app.gateway.numbers import newer, tick_ms
 from app.gateway.outbox import Outbox
+from app.gateway.pace import Pace
 from app.gateway.roles import FRAME, OPERATORS_ONLY, Role, may_send
 from app.link.header import HEADER_SIZE, FrameHeader
 from app.pipeline.decode import read_header
@@ -37,6 +41,10 @@ MAX_STOPS = 8
 """Stops of one session under way at once; one more would tell the robot nothing new."""
 MAX_REQUESTS = 16
 """Requests to the robot that may wait for those before them."""
+MAX_MESSAGES_HZ = 200.0
+"""A client that sends more in the long run is read no faster, so that a flood from one does not
+take the time of all; a page sends less than half of it."""
+MESSAGE_BURST = 100
 IDLE_CHECK_S = 0.05
 CLOSE_BAD = 1007
 CLOSE_TOO_BIG = 1009
@@ -89,6 +97,8 @@ class OperatorSession:
         self._bad_in_a_row = 0
         self._opened_tick = tick_ms()
         self._age = FrameAge(hub.settings.gateway.max_frame_age_ms)
+        self._pictures = PictureAge(hub.settings.gateway.picture_age_ms)
+        self._scale = 1.0
         self._detail = False
         self._next_detail = 0.0
 
@@ -162,10 +172,13 @@ class OperatorSession:
     # Reading
 
     async def _read(self) -> None:
+        pace = Pace(MAX_MESSAGES_HZ, MESSAGE_BURST)
         while True:
             message = await self._socket.receive()
             if message["type"] == "websocket.disconnect":
                 return
+            if (wait := pace.wait_s(time.monotonic())) > 0:
+                await asyncio.sleep(wait)
             self._arrivals += 1
             data, text = message.get("bytes"), message.get("text")
             size = len(data) if data is not None else len(text or "")
@@ -209,6 +222,7 @@ class OperatorSession:
         if detail:
             self._next_detail = now + 1 / self._settings.gateway.detail_rate_hz
         enrolled = self._hub.gallery.current
+        state = self._hub.robot.live_state
         self._slot = FrameJob(
             seq=seq,
             jpeg=jpeg,
@@ -217,8 +231,10 @@ class OperatorSession:
             situation=Situation(
                 actions=enrolled.actions,
                 lease=self._leases.lease,
-                state=self._hub.robot.live_state,
+                state=state,
                 stale=self._age(header.tick, header.captured_ms, tick_ms()),
+                unseen=None if state is None else self._pictures(state.tick),
+                scale=self._scale,
                 at=now,
             ),
             enrolled=enrolled,
@@ -255,6 +271,10 @@ class OperatorSession:
                 self.outbox.put({"type": "pong", "t": message.t, "tick": tick_ms()})
             case View():
                 self._detail = message.detail
+            case Speed():
+                self._scale = message.scale
+            case Picture():
+                self._pictures.saw(message.camera, message.tick)
             case TakeControl():
                 self._queue(message)
             case _ if message.type == "stop":

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from app.gateway.robot_port import RobotPort
+from app.gateway.viser_aids import SceneAids
 from app.link.messages import Description, ObjectDescription, ObjectState, State
 
 if TYPE_CHECKING:
@@ -51,6 +52,7 @@ class ViserScene:
         self._ending = threading.Event()
         self._described: Description | None = None
         self._urdf: ViserUrdf | None = None
+        self._aids: SceneAids | None = None
         self._order: list[int | None] = []
         self._handles: list[Any] = []
         self._objects: dict[str, Any] = {}
@@ -64,6 +66,11 @@ class ViserScene:
             return None
         port: int = self._server.get_port()
         return port
+
+    @property
+    def aids(self) -> SceneAids | None:
+        """What is shown beside the robot; None before the robot is."""
+        return self._aids
 
     @property
     def shown_tick(self) -> int | None:
@@ -130,6 +137,8 @@ class ViserScene:
 
         for handle in self._handles:
             handle.remove()
+        if self._aids is not None:
+            self._aids.remove()
         if self._urdf is not None:
             self._urdf.remove()
         self._handles, self._objects, self._shown = [], {}, None
@@ -137,6 +146,7 @@ class ViserScene:
         server.scene.configure_default_lights(cast_shadow=False)
         assets = model_assets(description.model)
         self._urdf = ViserUrdf(server, assets.urdf_path, root_node_name="/robot")
+        self._aids = SceneAids(server, self._urdf, assets.model.workspace)
         arm = {joint.name: index for index, joint in enumerate(description.joints)}
         self._order = [arm.get(name) for name in self._urdf.get_actuated_joint_names()]
         self._handles.append(
@@ -170,11 +180,15 @@ class ViserScene:
         )
 
     def _update(self, state: State) -> None:
-        assert self._urdf is not None
+        assert self._urdf is not None and self._aids is not None
         # Joints that the description does not name are the fingers: each takes half the width.
         finger = state.gripper / 2
-        angles = [finger if index is None else state.joints[index] for index in self._order]
-        self._urdf.update_cfg(np.asarray(angles))
+        actual, commanded = (
+            np.array([finger if index is None else joints[index] for index in self._order])
+            for joints in (state.joints, state.commanded)
+        )
+        self._urdf.update_cfg(actual)
+        self._aids.update(actual, commanded, state.clearance)
         for thing in state.objects:
             self._place(thing)
 

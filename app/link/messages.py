@@ -91,7 +91,8 @@ class LeaseRequest(Message):
     arm then stops and must be armed again). ``renew``: still there (every 0.5 s; 2 s without frees
     the lease). ``release``. ``arm`` and ``disarm``: need the lease. ``reset``: leave the latched
     stop; moves nothing and leaves the robot disarmed; needs no lease. ``reset_scene``: put every
-    movable thing back where it was at first; needs the lease, and the arm to be disarmed.
+    movable thing back where it was at first; needs no lease, but an arm that is disarmed or
+    stopped, and stands.
     """
 
     kind: Literal["take", "renew", "release", "arm", "disarm", "reset", "reset_scene"]
@@ -141,10 +142,14 @@ class Transition(Message):
 
 
 class LoopState(Message):
-    """How well the control loop keeps its time, over the last second."""
+    """How well the control loop keeps its time."""
 
-    rate_hz: float
-    late_max_ms: float
+    rate_hz: float = Field(description="over the last second")
+    late_max_ms: float = Field(description="over the last second")
+    cycles: int = Field(default=0, ge=0, description="that were due since the loop started")
+    late: int = Field(
+        default=0, ge=0, description="of these began more than 5 ms after their time, or never"
+    )
 
 
 class State(Message):
@@ -160,6 +165,7 @@ class State(Message):
     epoch: int
     stop: StopCategory | None = Field(default=None, description="category in force")
     reason: str | None = Field(default=None, description="why it stands, in plain words")
+    doubt: Doubt | None = Field(default=None, description="why it holds, when doubt is the reason")
     fault: str | None = None
     stops: int = Field(default=0, description="stop requests received; confirms a StopRequest")
     joints: tuple[float, ...] = Field(description="rad, measured")
@@ -218,6 +224,13 @@ class ObjectDescription(Message):
     fixed: bool = False
 
 
+class WorkspaceDescription(Message):
+    """The box that the tool may not leave."""
+
+    lower: tuple[float, float, float] = Field(description="m, base frame")
+    upper: tuple[float, float, float] = Field(description="m, base frame")
+
+
 class Description(Message):
     """What a robot is. Key ``/description``, answered on request."""
 
@@ -227,5 +240,7 @@ class Description(Message):
     joints: tuple[JointDescription, ...]
     poses: dict[str, tuple[float, ...]] = Field(description="named joint positions, rad")
     gripper_max: float = Field(description="m")
+    gripper_force: float | None = Field(default=None, description="N of each finger, at most")
+    workspace: WorkspaceDescription | None = None
     cameras: tuple[CameraDescription, ...]
     objects: tuple[ObjectDescription, ...] = ()

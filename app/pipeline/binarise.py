@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.config import BinariseSettings
+from app.pipeline.holes import fill_holes
 from app.pipeline.normalise import Normalised
 from app.pipeline.types import U8
 
@@ -55,6 +56,7 @@ class Binarise:
             mask.fill(0)
         elif not light:
             cv2.bitwise_xor(mask, 1, dst=mask)  # type: ignore[call-overload]
+        fill_holes(mask, self._settings.fill_holes)
         return Binary(mask, level, contrast, light)
 
     def _hand_is_light(self, mask: U8) -> bool:

@@ -21,6 +21,9 @@ AGREE = 0.65
 plain backgrounds all photographs have more than 0.84, in rooms half have less than this."""
 PROVE_EVERY, DOUBT = 30, 60
 """Frames after which a threshold is proved again, and for which one that failed is not tried."""
+ALIKE = 1.5
+"""A proof holds for pieces of the proved one's area, within this factor either way. Once the hand
+has left a wall that is darker to one side, the threshold splits the wall: a large new piece."""
 PATIENCE = 5
 """Frames in a row that have to speak for the other way before it is taken: the two masks differ a
 little, and going to and fro would look like motion."""
@@ -29,8 +32,9 @@ little, and going to and fro would look like motion."""
 class Choose:
     """Plain or not is told from the rim of a thumbnail, and proved by the network now and then.
 
-    A plain wall may still have a face before it: so the first mask by threshold, and every
-    thirtieth after it, is held against the network's (:meth:`prove`).
+    A plain wall may still have a face before it, or nothing at all: so the first mask by threshold,
+    every thirtieth after it, and each that is unlike the proved one (:meth:`found`) is held against
+    the network's (:meth:`prove`).
     """
 
     def __init__(self, settings: BinariseSettings) -> None:
@@ -39,6 +43,7 @@ class Choose:
         self._against = 0
         self._proof_in = 0
         self._doubt = 0
+        self._found = self._proved = 0
 
     def __call__(self, pixels: U8) -> Way:
         """Choose for a (h, w, 3) BGR or (h, w, 1) grey picture, the next of a stream."""
@@ -64,6 +69,12 @@ class Choose:
             return Way("learned", "the background has been plain for a moment only")
         return Way("learned", "the background is not plain")
 
+    def found(self, area: int) -> None:
+        """The threshold found a piece of so many pixels; 0: none that may be a hand."""
+        self._found = area
+        if not self._proved <= area * ALIKE <= self._proved * ALIKE**2:
+            self._proof_in = -1
+
     @property
     def unproved(self) -> bool:
         """Whether the mask by threshold, just chosen, is to be held against the network's."""
@@ -79,6 +90,7 @@ class Choose:
         either = cv2.countNonZero(cv2.bitwise_or(threshold, learned))
         if either and both / either >= AGREE:
             self._proof_in = PROVE_EVERY
+            self._proved = self._found
             return None
         self._now, self._against, self._doubt = "learned", 0, DOUBT
         return Way("learned", "the background is plain, but the threshold finds other things")

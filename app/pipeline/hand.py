@@ -6,6 +6,9 @@ Live frames, photographs for enrolment and an edge node all take this way.
 from dataclasses import dataclass, field
 from time import perf_counter
 
+import cv2
+import numpy as np
+
 from app.config import PipelineSettings
 from app.pipeline.binarise import Binarise
 from app.pipeline.channel import Channel
@@ -13,8 +16,13 @@ from app.pipeline.choose import Choose
 from app.pipeline.mask import LearnedMask, Masked
 from app.pipeline.normalise import Normalise
 from app.pipeline.palm import Palm, PalmFinder
+from app.pipeline.quality import two_hands
 from app.pipeline.smooth import Smooth
-from app.pipeline.types import U8, Way
+from app.pipeline.types import F32, U8, Way
+
+SURE = 0.85
+"""Share of hand from which a pixel counts towards a second hand: a face or a lamp that the network
+half takes for one must not refuse a good picture."""
 
 
 @dataclass
@@ -40,6 +48,7 @@ class FindHand:
 
     Attributes:
         way: How the last mask was made, and why so.
+        looks: How often the network ran for it.
     """
 
     def __init__(self, settings: PipelineSettings) -> None:
@@ -51,11 +60,16 @@ class FindHand:
         self._learned: LearnedMask | None = None
         self._find_palm = PalmFinder()
         self._settings = settings.binarise
+        self._second_hand = settings.quality.second_hand
+        self._mask: U8 = np.empty(0, np.uint8)
+        self._two = False
         self._contrast = self._sure = 0.0
         self.way = Way("threshold", "")
+        self.looks = 0
 
     def __call__(self, pixels: U8, watch: Stopwatch) -> Palm:
         """Find the hand in (h, w, 3) BGR or (h, w, 1) grey."""
+        self.looks = 0
         self.way = self._choose(pixels)
         watch.lap("choose")
         if self.way.mode == "learned":
@@ -67,11 +81,13 @@ class FindHand:
         normalised = self._normalise(smooth)
         watch.lap("normalise")
         binary = self._binarise(normalised)
-        self._contrast = binary.contrast
+        self._contrast, self._mask = binary.contrast, binary.mask
         watch.lap("binarise")
         palm = self._find_palm(binary.mask)
         watch.lap("palm")
-        if not self._choose.unproved or self.why_none(palm) is not None:
+        none = self.why_none(palm) is not None
+        self._choose.found(0 if none else palm.area)
+        if none or not self._choose.unproved:
             return palm
         learned = self._network(pixels)
         # The network may have looked at a part only; the arm goes on outside of it.
@@ -96,7 +112,25 @@ class FindHand:
         # Made when first needed: with the threshold alone the network is never loaded.
         if self._learned is None:
             self._learned = LearnedMask()
-        return self._learned(pixels)
+        masked = self._learned(pixels)
+        self.looks += self._learned.looks
+        return masked
+
+    def two_hands(self, palm: Palm) -> bool:
+        """Whether there is a second hand beside the one that was just found.
+
+        The network looks at the part round the hand, and at the whole picture every now and then;
+        while there are two hands, every time.
+        """
+        if self.way.mode == "threshold":
+            return two_hands(self._mask, palm, self._second_hand)
+        assert self._learned is not None
+        if (share := self._learned.everything) is not None:
+            height, width = palm.piece.shape
+            self._two = two_hands(surely_hand(share, width, height), palm, self._second_hand)
+        if self._two:
+            self._learned.look_round()
+        return self._two
 
     def why_none(self, palm: Palm) -> str | None:
         """Why the piece last found is no hand, in plain words; None when it may be one."""
@@ -126,3 +160,9 @@ class FindHand:
                 f"at most {limits.max_area:.0%} allowed"
             )
         return None
+
+
+def surely_hand(share: F32, width: int, height: int) -> U8:
+    """The network's share of hand over a whole picture to its (h, w) mask of what is sure."""
+    mask = cv2.resize(share, (width, height), interpolation=cv2.INTER_LINEAR) > SURE
+    return mask.view(np.uint8)

@@ -2,7 +2,8 @@
 
 The network (training/MODEL_CARD.md) sees the whole picture first. Where the hand fills little of
 it, a second look at the part round its palm gives the fingers; in a stream that part is looked at
-directly as long as the hand stays in it, so that most frames take one look.
+directly as long as the hand stays in it, so that most frames take one look. What is followed may
+not be the hand: when something moves beside it, the whole picture is looked at again.
 """
 
 import math
@@ -12,7 +13,8 @@ import cv2
 import numpy as np
 
 from app.pipeline.network import load
-from app.pipeline.types import F32, U8, Box
+from app.pipeline.palm import MIN_CONTACT, arm_side
+from app.pipeline.types import F32, U8, Box, Side
 
 MODEL = "hand_mask.onnx"
 SIDE = 160
@@ -23,6 +25,14 @@ THRESHOLD = 0.6
 """Share of hand from which a pixel is hand: a little more than half keeps close fingers apart."""
 REACH = 4.6
 """Palm radii from the palm's centre to the edge of a second look; finger tips are within 4."""
+ASIDE, BEHIND = 3.6, 2.6
+"""The same to either side, and towards the arm, where it is seen from which side the arm comes:
+what lies beyond is cut off at the wrist, or is another thing."""
+FINE = 17.0
+"""Pixels of a palm's radius in a look that follows a hand; more does not make fingers clearer."""
+AGAIN, NEW = 5, 30
+"""Frames after which the whole picture is looked at again although the hand is followed: the first
+when something changed beside it, the second in any case."""
 WORTH_IT = 0.6
 """A second look is taken when its part is smaller than this part of the picture."""
 SAME_MEAN, SAME_MOST = 0.8, 6.0
@@ -30,15 +40,23 @@ SAME_MEAN, SAME_MOST = 0.8, 6.0
 stays below when averaged, a finger tip that moves does not."""
 MOST_SKIPPED = 5
 """Frames in a row that the last mask may stand for; a mistake never lasts."""
+BESIDE, CELLS = 24, 6
+"""Levels by which at least so many cells of the thumbnail change when something comes into view
+beside the part that is followed."""
 _THUMB = (40, 30)
 
 
+GROWN = 5.0
+"""Palm radii that the longer side of a part has at least; a hand that came nearer has fewer."""
+
+
 class Hand(NamedTuple):
-    """Where a coarse look found a palm, in pixels of the picture."""
+    """Where a look found a palm, in pixels of the picture, and the side its arm comes from."""
 
     x: float
     y: float
     radius: float
+    arm: Side | None
 
 
 class Masked(NamedTuple):
@@ -61,16 +79,22 @@ class LearnedMask:
     def __init__(self) -> None:
         self._session = load(MODEL)
         self._part: Box | None = None
+        self._followed = 0
+        self._fine = math.inf
+        self._around: U8 = np.empty(0, np.uint8)
         self._mask: U8 = np.empty(0, np.uint8)
         self._thumb: U8 = np.empty(0, np.uint8)
         self._masked: Masked | None = None
         self._skipped = 0
+        self.everything: F32 | None = None
+        """Share of hand of the whole picture, when all of it was looked at for the last one."""
         self.looks = 0
         """Looks that the last picture took: 0 when the one before stood for it."""
 
     def __call__(self, pixels: U8) -> Masked:
         """Find the hand in a picture, the next of a stream or the only one."""
         self.looks = 0
+        self.everything = None
         thumb = np.asarray(cv2.resize(pixels, _THUMB, interpolation=cv2.INTER_AREA), np.uint8)
         if self._masked is not None and self._same(thumb, pixels):
             self._skipped += 1
@@ -80,20 +104,45 @@ class LearnedMask:
             self._mask = np.empty(pixels.shape[:2], np.uint8)
             self._part = None
         whole = (0, 0, pixels.shape[1], pixels.shape[0])
+        if self._part is not None and self._stale(thumb, self._part, whole):
+            self._part = None
         bounds = self._part or whole
-        share = self._look(pixels, bounds)
-        hand = _palm(share, bounds)
+        share = self._look(pixels, bounds, self._fine if self._part else math.inf)
+        hand = _palm(share, bounds, whole)
         if bounds != whole and not (hand and _inside(hand, bounds, whole)):
             bounds = whole
             share = self._look(pixels, bounds)
-            hand = _palm(share, bounds)
-        if bounds == whole and hand and (part := _part_round(hand, whole)) is not None:
-            closer = self._look(pixels, part)
-            if (seen := _palm(closer, part)) is not None:
-                bounds, share, hand = part, closer, seen
+            hand = _palm(share, bounds, whole)
+        if bounds == whole:
+            self._followed, self._around, self.everything = 0, thumb, share
+            if hand and (part := _part_round(hand, whole)) is not None:
+                closer = self._look(pixels, part, FINE / hand.radius)
+                if (seen := _palm(closer, part, whole)) is not None:
+                    bounds, share, hand = part, closer, seen
+        self._followed += 1
         self._part = _part_round(hand, whole) if hand else None
+        self._fine = FINE / hand.radius if hand else math.inf
         self._masked = self._spread(share, bounds)
         return self._masked
+
+    def look_round(self) -> None:
+        """Look at the whole of the next picture that is not like this one."""
+        self._followed = NEW
+
+    def _stale(self, thumb: U8, part: Box, whole: Box) -> bool:
+        """Whether another hand may have come into the picture beside the part."""
+        if self._followed < AGAIN:
+            return False
+        if self._followed >= NEW or thumb.shape != self._around.shape:
+            return True
+        change = cv2.absdiff(thumb, self._around)
+        x, y, width, height = part
+        across, down = _THUMB[0] / whole[2], _THUMB[1] / whole[3]
+        rows = slice(int(y * down), math.ceil((y + height) * down))
+        columns = slice(int(x * across), math.ceil((x + width) * across))
+        change[rows, columns] = 0
+        most = change if change.ndim == 2 else change.max(axis=2)
+        return bool(np.count_nonzero(most > BESIDE) >= CELLS)
 
     def _same(self, thumb: U8, pixels: U8) -> bool:
         if self._skipped >= MOST_SKIPPED or self._mask.shape != pixels.shape[:2]:
@@ -103,11 +152,11 @@ class LearnedMask:
         change = cv2.absdiff(thumb, self._thumb)
         return bool(change.mean() <= SAME_MEAN and change.max() <= SAME_MOST)
 
-    def _look(self, pixels: U8, part: Box) -> F32:
+    def _look(self, pixels: U8, part: Box, most: float = math.inf) -> F32:
         """Share of hand of a part of the picture, at half the network's resolution."""
         self.looks += 1
         x, y, width, height = part
-        scale = SIDE / math.sqrt(width * height)
+        scale = min(SIDE / math.sqrt(width * height), most)
         size = _fitting(width * scale), _fitting(height * scale)
         shrinks = size[0] < width
         seen = cv2.resize(
@@ -136,7 +185,7 @@ def _fitting(length: float) -> int:
     return min(max(round(length / STEP), 3), 24) * STEP
 
 
-def _palm(share: F32, part: Box) -> Hand | None:
+def _palm(share: F32, part: Box, whole: Box) -> Hand | None:
     """The largest inscribed circle of the share, in pixels of the picture; None when too small."""
     rows, columns = share.shape
     framed = np.zeros((rows + 2, columns + 2), np.uint8)
@@ -145,19 +194,28 @@ def _palm(share: F32, part: Box) -> Hand | None:
     _, radius, _, (column, row) = cv2.minMaxLoc(distance)
     if radius < 1.5:
         return None
+    cv2.floodFill(framed, None, (column, row), 2)
+    arm = arm_side((framed[1:-1, 1:-1] == 2).view(np.uint8), MIN_CONTACT * radius)
     x, y, width, height = part
     across, down = width / columns, height / rows
     return Hand(
-        x + (column - 0.5) * across, y + (row - 0.5) * down, radius * math.sqrt(across * down)
+        x + (column - 0.5) * across, y + (row - 0.5) * down, radius * math.sqrt(across * down), arm
     )
 
 
 def _part_round(hand: Hand, whole: Box) -> Box | None:
     """The part for a second look; None when it is not worth one."""
-    reach = REACH * hand.radius
-    left, top = max(0, int(hand.x - reach)), max(0, int(hand.y - reach))
-    right = min(whole[2], math.ceil(hand.x + reach))
-    bottom = min(whole[3], math.ceil(hand.y + reach))
+    far, aside, near = REACH * hand.radius, ASIDE * hand.radius, BEHIND * hand.radius
+    reach = {
+        None: (far, far, far, far),
+        "bottom": (aside, far, aside, near),
+        "top": (aside, near, aside, far),
+        "left": (near, aside, far, aside),
+        "right": (far, aside, near, aside),
+    }[hand.arm]
+    left, top = max(0, int(hand.x - reach[0])), max(0, int(hand.y - reach[1]))
+    right = min(whole[2], math.ceil(hand.x + reach[2]))
+    bottom = min(whole[3], math.ceil(hand.y + reach[3]))
     if (right - left) * (bottom - top) >= WORTH_IT * whole[2] * whole[3]:
         return None
     return left, top, right - left, bottom - top
@@ -168,7 +226,7 @@ def _inside(hand: Hand, part: Box, whole: Box) -> bool:
     x, y, width, height = part
     reach = 1.5 * hand.radius
     return (
-        max(width, height) >= 1.3 * REACH * hand.radius
+        max(width, height) >= GROWN * hand.radius
         and (x == 0 or hand.x - reach >= x)
         and (y == 0 or hand.y - reach >= y)
         and (x + width == whole[2] or hand.x + reach <= x + width)

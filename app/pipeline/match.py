@@ -11,7 +11,7 @@ from app.config import MatchSettings
 from app.errors import Invalid
 from app.pipeline.features import Features
 from app.pipeline.template import HEIGHT, WIDTH
-from app.pipeline.types import F32, U8, Match
+from app.pipeline.types import F32, U8, Cause, Match
 from app.pipeline.views import Views
 
 OWN_REACH = 1.2
@@ -201,10 +201,10 @@ class PcaMatcher:
             margin = distances[second] - distance
         best_view = int(table[:, self._parts[best]].min(axis=1).argmin())
         error = float(points[best_view, -1]) / float(np.sqrt(self._dimensions))
-        reason = self._why_unknown(self.labels[best], distance, second, margin, error)
+        cause, reason = self._why_unknown(self.labels[best], distance, second, margin, error)
         strangeness = self._strangeness(distance, margin, error)
         match = Match(
-            self.labels[best], distance, margin, error, reason is None, reason, strangeness
+            self.labels[best], distance, margin, error, cause is None, reason, strangeness, cause
         )
         return Matched(match, distances)
 
@@ -222,20 +222,20 @@ class PcaMatcher:
 
     def _why_unknown(
         self, name: str, distance: float, second: str, margin: float | None, error: float
-    ) -> str | None:
+    ) -> tuple[Cause, str] | tuple[None, None]:
         if distance > self.max_distance:
-            return (
+            return "unknown_hand", (
                 f"unknown hand: closest is {name}, but too far "
                 f"({distance:.2f}, at most {self.max_distance:.2f})"
             )
         if error > self.settings.max_error:
-            return (
+            return "unknown_hand", (
                 f"unknown hand: closest is {name}, but the shape is unlike any enrolled one "
                 f"({error:.2f}, at most {self.settings.max_error:.2f})"
             )
         if margin is not None and margin < self.settings.min_margin:
-            return f"undecided: {name} and {second} are almost equally close"
-        return None
+            return "low_margin", f"undecided: {name} and {second} are almost equally close"
+        return None, None
 
 
 def _principal(centred: F32, components: int) -> F32:

@@ -1,5 +1,7 @@
 """The pipeline: the order of the stages, and a name for everything between them."""
 
+import zlib
+
 from app.config import PipelineSettings
 from app.pipeline.agreement import Agreement
 from app.pipeline.decode import Decode
@@ -9,7 +11,7 @@ from app.pipeline.motion import MotionGate
 from app.pipeline.palm import Palm
 from app.pipeline.roi import RegionOfInterest
 from app.pipeline.template import MakeTemplate
-from app.pipeline.types import U8, Box, FrameResult, GestureEvent, WristCut
+from app.pipeline.types import U8, Box, Cause, FrameResult, GestureEvent, WristCut
 from app.pipeline.views import Views
 from app.pipeline.wrist import WristCrop
 
@@ -24,6 +26,7 @@ STAGES = (
     "motion",
     "wrist",
     "roi",
+    "alone",
     "template",
     "views",
     "match",
@@ -72,6 +75,7 @@ class Pipeline:
         """
         watch = Stopwatch(dict.fromkeys((*STAGES, "total"), 0.0))
         frame = self._decode(jpeg)
+        digest = zlib.crc32(frame.pixels.data)
         watch.lap("decode")
         palm = self._find_hand(frame.pixels, watch)
         motion = self._gate(palm.piece, now)
@@ -81,6 +85,7 @@ class Pipeline:
         cut: WristCut | None = None
         template: U8 | None = None
         matched = Matched(None, {})
+        cause: Cause | None = None
         reason = self._find_hand.why_none(palm)
         if reason is None:
             hand, cut = self._crop_wrist(palm)
@@ -89,11 +94,17 @@ class Pipeline:
             watch.lap("roi")
             if box is None:
                 reason = "no hand in the picture: nothing is left above the wrist"
+        if reason is not None:
+            cause = "no_hand"
+        elif self._find_hand.two_hands(palm):
+            cause, reason = "two_hands", "two hands in the picture: show one"
+        watch.lap("alone")
         held = self._agree.gesture is not None
         looked_at = motion.still or motion.trembling or (held and motion.nearly_still)
         if reason is None and motion.fraction is None:
-            reason = "waiting for three frames"
+            cause, reason = "waiting", "waiting for three frames"
         elif reason is None and not looked_at:
+            cause = "moving"
             reason = f"hand still moving: {motion.fraction:.1%} of the pixels changed"
         elif reason is None and box is not None:
             template = self._make_template(hand, box)
@@ -102,7 +113,7 @@ class Pipeline:
             watch.lap("views")
             matched = self.matcher(views)
             watch.lap("match")
-            reason = matched.match.reason if matched.match else "no gesture is enrolled yet"
+            cause, reason = why_unmatched(matched, at_rest=motion.still or motion.trembling)
 
         shown = matched.match.gesture if matched.match and matched.match.accepted else None
         strangeness = matched.match.strangeness if matched.match else 1.0
@@ -120,10 +131,21 @@ class Pipeline:
             match=matched.match,
             distances=matched.distances,
             reason=reason,
+            cause=cause,
+            digest=digest,
             timing_ms=watch.timing_ms,
             event=event,
             gesture=self._agree.gesture,
+            looks=self._find_hand.looks,
         )
+
+
+def why_unmatched(matched: Matched, *, at_rest: bool) -> tuple[Cause | None, str | None]:
+    """Why the hand that was matched is no gesture, for programs and in plain words."""
+    if matched.match is None:
+        return "nothing_enrolled", "no gesture is enrolled yet"
+    unknown = not matched.match.accepted
+    return "moving" if unknown and not at_rest else matched.match.cause, matched.match.reason
 
 
 def whole_or_cut(palm: Palm, hand: U8, settings: PipelineSettings) -> Palm:

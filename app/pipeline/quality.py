@@ -165,24 +165,43 @@ def _why_too_small(palm: Palm, settings: QualitySettings) -> Finding | None:
     )
 
 
-def _why_two(mask: U8, palm: Palm, settings: QualitySettings) -> Finding | None:
+def two_hands(mask: U8, palm: Palm, least: float) -> bool:
+    """Whether the mask holds a second hand.
+
+    A piece of its own, away from the hand, with at least ``least`` of its palm's radius and
+    :data:`SECOND_AREA` of its area. Most masks have too little left beside the hand, which costs
+    next to nothing to see.
+
+    Args:
+        mask: (h, w) of 0 and 1: everything that was taken for a hand.
+        palm: The hand in it.
+        least: In palm radii; 0: never.
+    """
+    if not least or not palm.found:
+        return False
     rest = np.asarray(cv2.bitwise_and(mask, palm.piece ^ 1), np.uint8)
-    if not settings.second_hand or not cv2.countNonZero(rest):
-        return None
+    if cv2.countNonZero(rest) < SECOND_AREA * palm.area:
+        return False
     away = cv2.distanceTransform(palm.piece ^ 1, cv2.DIST_L2, 5)
     find = PalmFinder()
     while True:
         second = find(rest)
-        if second.radius < settings.second_hand * palm.radius:
-            return None
+        if second.radius < least * palm.radius:
+            return False
         apart = float(away[second.piece > 0].min())
         if second.area >= SECOND_AREA * palm.area and apart > APART * palm.radius:
-            return Finding(
-                "two_hands",
-                "there are two hands in the picture, or a thing that looks like one: show one hand "
-                "and nothing else",
-            )
+            return True
         rest[second.piece > 0] = 0
+
+
+def _why_two(mask: U8, palm: Palm, settings: QualitySettings) -> Finding | None:
+    if not two_hands(mask, palm, settings.second_hand):
+        return None
+    return Finding(
+        "two_hands",
+        "there are two hands in the picture, or a thing that looks like one: show one hand "
+        "and nothing else",
+    )
 
 
 def _why_no_wrist(palm: Palm) -> Finding | None:

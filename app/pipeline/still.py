@@ -12,7 +12,7 @@ from app.errors import ImageRefused, TooLarge
 from app.pipeline.binarise import Binarise
 from app.pipeline.channel import Channel
 from app.pipeline.formats import ImageInfo, cut_short, read_info
-from app.pipeline.hand import FindHand, Stopwatch
+from app.pipeline.hand import FindHand, Stopwatch, surely_hand
 from app.pipeline.mask import LearnedMask
 from app.pipeline.normalise import Normalise
 from app.pipeline.palm import Palm
@@ -29,10 +29,6 @@ BAND = 256
 """Rows of a PNG or WebP that are brought to 8 bits without transparency at a time."""
 MIN_SIDE = 32
 """Pixels. A smaller photograph does not fill a template of 60x80 with anything of its own."""
-
-SURE = 0.85
-"""Share of hand from which a pixel counts towards a second hand: a face or a lamp that the network
-half takes for one must not refuse a good photograph."""
 
 
 class Shot(NamedTuple):
@@ -201,8 +197,7 @@ def _everything(found: _Found, settings: PipelineSettings) -> U8:
         height, width = found.palm.piece.shape
         whole = (0, 0, width, height)
         share = LearnedMask()._look(found.pixels, whole)
-        mask = cv2.resize(share, (width, height), interpolation=cv2.INTER_LINEAR) > SURE
-        return mask.view(np.uint8)
+        return surely_hand(share, width, height)
     plane = Channel(settings.binarise.channel)(found.pixels)
     normalised = Normalise(settings.normalise)(Smooth(settings.smooth)(plane))
     return Binarise(settings.binarise)(normalised).mask

@@ -15,6 +15,11 @@ F32 = NDArray[np.float32]
 Box = tuple[int, int, int, int]
 Side = Literal["bottom", "left", "top", "right"]
 Phase = Literal["start", "hold", "end"]
+Cause = Literal[
+    "no_hand", "two_hands", "waiting", "moving", "nothing_enrolled", "unknown_hand", "low_margin"
+]
+"""Why a frame shows no gesture, for programs. ``moving`` also stands for a hand that is not known
+while it moves: it may be on its way from one gesture to another."""
 
 
 class Way(NamedTuple):
@@ -46,6 +51,7 @@ class Match:
         error: Reconstruction error, in the unit of the distance.
         accepted: False when the distance, the margin or the error says that it is unknown.
         reason: Why it is not accepted, in plain words.
+        cause: The same for programs.
         strangeness: How unlike anything enrolled, in one number: up to 1 is accepted, more is not.
     """
 
@@ -56,6 +62,7 @@ class Match:
     accepted: bool
     reason: str | None = None
     strangeness: float = 0.0
+    cause: Cause | None = None
 
 
 @dataclass(frozen=True)
@@ -83,9 +90,12 @@ class FrameResult:
         match: The nearest gesture, also when it was not accepted; None without a template.
         distances: Distance to every enrolled gesture.
         reason: Why nothing comes of this frame, in plain words; None when a gesture was seen.
+        cause: The same for programs.
+        digest: Checksum of the pixels: that of the frame before, when nothing at all has changed.
         timing_ms: Time spent in each stage, and ``total``.
         event: What changed with this frame.
         gesture: The gesture that is held now.
+        looks: How often the mask network ran; 0 by threshold, and when the last mask stands.
     """
 
     seq: int
@@ -102,6 +112,9 @@ class FrameResult:
     event: GestureEvent | None
     gesture: str | None
     distances: Mapping[str, float] = field(default_factory=dict)
+    cause: Cause | None = None
+    digest: int = 0
+    looks: int = 0
 
     def as_message(self, tick: int = 0) -> dict[str, Any]:
         """The ``frame`` message of docs/protocol.md. A match that was not accepted is null."""

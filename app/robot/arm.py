@@ -1,6 +1,6 @@
 """What the control loop needs of an arm, simulated or real."""
 
-from typing import NamedTuple, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,18 @@ class ToolPose(NamedTuple):
     """Unit quaternion w, x, y, z, shape (4,)"""
 
 
+class Contact(NamedTuple):
+    """A link of the arm presses on a thing."""
+
+    link: str
+    """Name in the URDF"""
+    thing: str
+    force: float
+    """N, the sum of the normal forces"""
+    grasp: bool
+    """A finger on something that can be grasped"""
+
+
 class Reading(NamedTuple):
     """What an arm measures, all of one moment."""
 
@@ -30,6 +42,55 @@ class Reading(NamedTuple):
     """m between the fingers"""
     tool: ToolPose
     objects: tuple[ObjectState, ...]
+    contacts: tuple[Contact, ...] = ()
+    """What the arm touches, itself not counted; none where an arm does not feel"""
+    held: str | None = None
+    """Name of the thing that both fingers hold"""
+
+
+NearKind = Literal["scene", "hand", "held", "itself"]
+"""``scene``: a link of the arm and a thing. ``hand``: a finger, or what carries the fingers, and a
+thing that does not move. ``held``: what is held and another thing. ``itself``: the arm and its own
+links, or what it holds and its own links."""
+Point = tuple[float, float, float]
+
+
+class Near(NamedTuple):
+    """Two that are near one another."""
+
+    kind: NearKind
+    link: str
+    """Of the arm, or the name of what it holds"""
+    thing: str
+    """Name of the thing, or the arm's other link"""
+    distance: float
+    """m; negative when they overlap"""
+    points: tuple[Point, Point]
+    """m, base frame: the nearest points, on the link and on the thing"""
+
+
+class Proximity(Protocol):
+    """What is near an arm, wherever its joints were."""
+
+    def follow(self, reading: Reading, *, standing: bool) -> bool:
+        """Take over where fingers and things are, and what is held.
+
+        Args:
+            reading: As measured.
+            standing: The arm stands: where a held thing lies in the hand is measured anew.
+
+        Returns:
+            Whether anything has changed, so that distances asked for before hold no more.
+        """
+        ...
+
+    def near(self, joints: Vector, within: float) -> list[Near]:
+        """What is nearer than ``within`` (m) with the joints at ``joints`` (rad, shape (n,))."""
+        ...
+
+    def plain(self, name: str) -> str:
+        """A link or thing in plain words."""
+        ...
 
 
 class Kinematics(Protocol):
@@ -65,6 +126,11 @@ class Arm(Protocol):
         """Its geometry."""
         ...
 
+    @property
+    def proximity(self) -> Proximity | None:
+        """What is near it; None where that cannot be known."""
+        ...
+
     def read(self) -> Reading:
         """Measure."""
         ...
@@ -79,6 +145,10 @@ class Arm(Protocol):
 
     def brake(self, engaged: bool) -> None:
         """Engaged: motors off and brakes on, nothing drops. Released: the motors hold."""
+        ...
+
+    def reset_scene(self) -> None:
+        """Put every thing that can move back where it was at first. Only while the arm stands."""
         ...
 
     def step(self) -> None:

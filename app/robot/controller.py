@@ -13,6 +13,7 @@ from app.config import ArmMotionSettings
 from app.link.actions import Stop
 from app.link.messages import (
     Command,
+    Doubt,
     LeaseReply,
     LeaseRequest,
     LoopState,
@@ -22,6 +23,7 @@ from app.link.messages import (
 )
 from app.robot.arm import Arm, Reading
 from app.robot.command_gate import CommandGate
+from app.robot.contact import ContactWatch
 from app.robot.latch import StopLatch
 from app.robot.lease import Lease
 from app.robot.motion.motion import Motion
@@ -33,6 +35,15 @@ DT = 1 / 240
 """s; one cycle."""
 RAMP_S = 0.2
 """Longest ramp of a stop; after it the brakes come on whatever the arm does."""
+DOUBTS: dict[Doubt, str] = {
+    "no_hand": "no hand is in the picture",
+    "unknown_hand": "the hand shows no gesture that is known",
+    "two_hands": "two hands are in the picture",
+    "low_margin": "the hand is between two gestures",
+    "frozen": "the webcam picture is frozen",
+    "stale_picture": "the operator's picture of the robot is too old",
+}
+"""Why the arm holds still, in plain words, when the gateway does not trust what it sees."""
 _STANDING = 0.02
 """rad/s; slower than this, a measured joint counts as standing."""
 
@@ -57,13 +68,16 @@ class Controller:
         self.arm = arm
         self.robot = robot
         self.lease = Lease(first_epoch=tick_of(now))
-        self.safety = Safety(latch)
+        self.safety = Safety(latch, tick_of(now))
         self.gate = CommandGate()
         self.motion = Motion(arm, settings, DT)
         self.fault: str | None = None
         self.braked = False
         self.reading: Reading = arm.read()
         self._following_error = settings.following_error
+        self._contact = ContactWatch(
+            settings.clearance.contact_force, arm.description.gripper_force or 0.0
+        )
         self._fresh_until = -1.0
         self._hold: int | None = None
         """The showing of a gesture whose action is being done."""
@@ -81,6 +95,7 @@ class Controller:
 
     def answer(self, request: LeaseRequest, now: float) -> LeaseReply:
         """Answer a request for the lease, or to arm, disarm or reset."""
+        self.safety.tick = tick_of(now)
         reply = self._answer(request, now)
         self._settle()  # at once: what comes next in this cycle may allow motion again
         if request.kind != "renew" or not reply.granted:
@@ -96,8 +111,11 @@ class Controller:
             return
         self.lease.seen(now)
         self._fresh_until = (command.tick + command.ttl_ms) / 1000
+        self.motion.trajectory.scale = command.scale
         shown = command.gesture is not None or command.action is not None
         self.safety.saw(now, gesture=shown)
+        if command.doubt is not None and command.action is None:
+            self._distrust(command.doubt)
         if isinstance(command.action, Stop):
             if command.hold > self._ended:
                 self._ended = command.hold
@@ -118,6 +136,7 @@ class Controller:
 
     def cycle(self, now: float, commands: Iterable[Command] = ()) -> None:
         """Let 1/240 s pass."""
+        self.safety.tick = tick_of(now)
         for command in commands:
             self.obey(command, now)
         if (gone := self.lease.expire(now)) is not None:
@@ -164,7 +183,11 @@ class Controller:
             frame=self._frame if motion.busy else None,
             action=motion.action,
             limits=motion.limits,
+            clearance=motion.guard.clearance,
             dropped=dict(self.gate.dropped),
+            doubt=self._doubt,
+            scale=motion.trajectory.scale,
+            transitions=tuple(safety.transitions),
             objects=reading.objects,
             loop=loop,
         )
@@ -203,7 +226,26 @@ class Controller:
                     self.fault = None
                 return reply
             case "reset_scene":
-                return LeaseReply(granted=False, code="refused", reason="not possible yet")
+                return self._reset_scene()
+
+    def _reset_scene(self) -> LeaseReply:
+        """Nobody's arm may be about to move when things jump back to where they began."""
+        if self.safety.armed:
+            return LeaseReply(
+                granted=False, code="armed", reason="the robot is armed: disarm it first"
+            )
+        if not (self.braked and self.standing):
+            return LeaseReply(granted=False, code="moving", reason="the arm has not come to rest")
+        self.arm.reset_scene()
+        return LeaseReply(granted=True)
+
+    def _distrust(self, doubt: Doubt) -> None:
+        """S2 if an action is under way: who shows nothing that is sure, or sees nothing, waits.
+
+        What has ended by itself, or was let go before, comes to rest without it.
+        """
+        if self._hold is not None and self.motion.busy:
+            self.safety.hold(DOUBTS[doubt])
 
     def _begin(self, command: Command) -> None:
         """A new showing of a gesture."""
@@ -257,11 +299,17 @@ class Controller:
         self.motion.reset(self.reading.joints)
         self.arm.brake(engaged)
         self.braked = engaged
+        self._contact.released(self.reading.contacts)
         log.info("brakes %s", "on" if engaged else "off")
 
     def _watch_arm(self) -> None:
-        """An arm that does not follow is blocked, or broken: S1."""
+        """An arm that has hit something, or does not follow: S1."""
         if self.braked or self.safety.phase is Phase.STOPPED:
+            return
+        touched = self._contact.collision(self.reading.contacts, self.motion.guard.plain)
+        if touched is not None:
+            self.fault = f"collision: {touched}"
+            self.safety.stop(StopRequest(source="arm", reason=self.fault))
             return
         error = self.reading.joints - self.motion.trajectory.position
         worst = int(np.abs(error).argmax())
@@ -272,6 +320,13 @@ class Controller:
                 "blocked?"
             )
             self.safety.stop(StopRequest(source="arm", reason=self.fault))
+
+    @property
+    def _doubt(self) -> Doubt | None:
+        """The doubt for which the arm holds, if it is for one."""
+        if self.safety.phase is not Phase.HOLDING:
+            return None
+        return next((doubt for doubt, why in DOUBTS.items() if why == self.safety.reason), None)
 
     def _mode(self) -> Mode:
         match self.safety.phase:

@@ -12,6 +12,8 @@ log = logging.getLogger(__name__)
 
 _GIVE_UP_CYCLES = 12
 """A loop this far behind (50 ms at 240 Hz) lets the lost cycles go; less is caught up."""
+LATE_S = 0.005
+"""A cycle that begins later than this after its time counts as late."""
 _SLACK_FOR_GC_S = 0.002
 _FULL_GC_CYCLES = 240 * 60
 """What keep_time() froze is not looked at again, so that this takes about a millisecond."""
@@ -30,6 +32,8 @@ class LoopClock:
         self._deadline = time.monotonic()
         self._lateness: deque[tuple[float, float]] = deque()
         self._cycles = 0
+        self._let_go = 0
+        self._late = 0
 
     def wait(self) -> float:
         """Sleep until the next cycle is due.
@@ -51,13 +55,17 @@ class LoopClock:
         self._lateness.append((now, late))
         while self._lateness[0][0] < now - 1.0:
             self._lateness.popleft()
+        self._late += late > LATE_S
         if late > _GIVE_UP_CYCLES * self._dt:
             log.warning("the control loop was %.0f ms late", late * 1000)
+            lost = int(late / self._dt)
+            self._let_go += lost
+            self._late += lost
             self._deadline = now
         return now
 
     def state(self) -> LoopState:
-        """Rate and worst lateness of the last second."""
+        """Rate and worst lateness of the last second, and what was counted since the start."""
         if len(self._lateness) < 2:
             return LoopState(rate_hz=0.0, late_max_ms=0.0)
         span = self._lateness[-1][0] - self._lateness[0][0]
@@ -65,6 +73,8 @@ class LoopClock:
         return LoopState(
             rate_hz=round((len(self._lateness) - 1) / max(span, 1e-6), 1),
             late_max_ms=round(max(0.0, worst) * 1000, 2),
+            cycles=self._cycles + self._let_go,
+            late=self._late,
         )
 
 

@@ -3,7 +3,8 @@
 ::
 
     phase     | arm      disarm    lease   stop S2,   stop S1,  N: no gesture  reset
-              |                    gone    watchdog   stop S0   for 0.5 s
+              |                    gone    watchdog,  stop S0   for 0.5 s
+              |                            doubt
     ----------+--------------------------------------------------------------------------
     DISARMED  | *        -         -       -          STOPPED   -              -
     HOLDING   | HOLDING  DISARMED  DISARM  HOLDING    STOPPED   ARMED          -
@@ -25,14 +26,17 @@ monotonic clock, and nothing else.
 
 import enum
 import logging
+from collections import deque
 
-from app.link.messages import LeaseReply, StopCategory, StopRequest
+from app.link.messages import LeaseReply, StopCategory, StopRequest, Transition
 from app.robot.latch import StopLatch
 
 log = logging.getLogger(__name__)
 
 NO_GESTURE_S = 0.5
 """N: commands must show no gesture for so long."""
+KEPT_TRANSITIONS = 5
+"""The newest steps, which every state tells again, so that one that is lost is no loss."""
 
 
 class Phase(enum.Enum):
@@ -52,10 +56,16 @@ class Safety:
 
     Args:
         latch: Where a latched stop is kept; one that is there from before stays in force.
+        tick: ms on the node's monotonic clock.
     """
 
-    def __init__(self, latch: StopLatch) -> None:
+    def __init__(self, latch: StopLatch, tick: int = 0) -> None:
         self._latch = latch
+        self.tick = tick
+        """ms; its owner keeps it up to date. Only for telling when a transition was."""
+        self.transitions: deque[Transition] = deque(maxlen=KEPT_TRANSITIONS)
+        """The newest steps, oldest first."""
+        self._steps = 0
         self.phase = Phase.DISARMED
         self.category: StopCategory | None = None
         """The stop in force."""
@@ -157,12 +167,26 @@ class Safety:
         before = (self.phase, self.category, self.reason)
         self.phase, self.category, self.reason = phase, category, reason
         self._owes_n |= category is not None
-        if before != (phase, category, reason):
-            log.info(
-                "%s %s -> %s %s: %s",
-                before[0].value,
-                before[1] or "",
-                phase.value,
-                category or "",
-                reason or "ready",
+        if before == (phase, category, reason):
+            return
+        self._steps += 1
+        # Values of our own need no checking; this runs in the control loop.
+        self.transitions.append(
+            Transition.model_construct(
+                number=self._steps,
+                tick=self.tick,
+                before=before[0].value,
+                after=phase.value,
+                stop=category,
+                reason=reason,
             )
+        )
+        log.info(
+            "step %d: %s %s -> %s %s: %s",
+            self._steps,
+            before[0].value,
+            before[1] or "",
+            phase.value,
+            category or "",
+            reason or "ready",
+        )

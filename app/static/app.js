@@ -22,6 +22,7 @@ import { preflightContent } from "./ui/preflight.js";
 import { readout } from "./ui/readout.js";
 import { sentence } from "./ui/sentence.js";
 import { askContent, goneContent, helpContent, Sheets } from "./ui/sheets.js";
+import { knownSpeed, speed, speedOf } from "./ui/speed.js";
 import { stage } from "./ui/stage.js";
 import { describeError } from "./ui/words.js";
 
@@ -70,6 +71,8 @@ goneOverlay(byId("gone"), store, (kind) => goneContent(kind, () => link.retryNow
 steps(byId("steps"), store);
 dockButtons(byId("dock-buttons"), store);
 stopButton(byId("stop"), store);
+store.set({ speed: knownSpeed(memory.get("speed")), fine: memory.get("fine") === "yes" });
+speed(byId("dock-speed"), store);
 sentence(byId("sentence"), byId("sentence-spoken"), store);
 const video = operatorView(byId("operator"), store);
 gestureList(byId("gestures"), store, { templateUrl: api.templateUrl });
@@ -150,6 +153,8 @@ link.addEventListener("message", ({ detail: message }) => {
 
 function greeted() {
     store.set({ connection: { state: "open" } });
+    sendSpeed();
+    reported = {};
     if (hadSession) notices.show(texts.notices.reconnected, { name: "reconnected" });
     hadSession = true;
     describedAt = -Infinity;
@@ -212,6 +217,36 @@ document.addEventListener("visibilitychange", () => {
     sendView();
     if (document.visibilityState !== "hidden") link.retryNow();
 });
+
+const REPORT_EVERY_MS = 250;
+const shown = {}; // newest tick of the robot in the pictures that were drawn, by camera
+let reported = {};
+for (const [name, feed] of Object.entries(feeds)) {
+    feed.addEventListener("picture", ({ detail }) => {
+        shown[name] = detail.tick;
+    });
+}
+
+/** Who drives by pictures says which ones: the robot holds still when they are old. */
+setInterval(() => {
+    if (!isDriving(store.state)) return;
+    for (const [camera, tick] of Object.entries(shown)) {
+        if (reported[camera] === tick) continue;
+        reported[camera] = tick;
+        link.send("picture", { camera, tick });
+    }
+}, REPORT_EVERY_MS);
+
+function sendSpeed() {
+    link.send("speed", { scale: speedOf(store.state) });
+}
+
+function setSpeed(changes) {
+    store.set(changes);
+    memory.set("speed", String(store.state.speed));
+    memory.set("fine", store.state.fine ? "yes" : "no");
+    sendSpeed();
+}
 
 setInterval(() => {
     const { latencyMs, rate, width, height } = sender;
@@ -339,6 +374,21 @@ async function reset() {
     }
 }
 
+function askResetScene() {
+    const { title, words, yes } = texts.resetScene;
+    const go = async () => {
+        sheets.close();
+        try {
+            await api.resetScene(robotId());
+            notices.show(texts.resetScene.done, { kind: "good", name: "scene" });
+        } catch (error) {
+            notices.show(describeError(error), { kind: "bad", name: "scene" });
+        }
+    };
+    const content = askContent(words, yes, go, () => sheets.close());
+    sheets.show("reset-scene", title, content);
+}
+
 stopper.addEventListener("state", ({ detail }) => {
     store.set({ stopping: detail });
     if (detail === "failed") {
@@ -354,6 +404,12 @@ const wishes = {
     swap: () => views.swap(),
     "toggle-control": toggleControl,
     "toggle-arm": toggleArm,
+    "toggle-fine": () => {
+        if (isDriving(store.state)) setSpeed({ fine: !store.state.fine });
+    },
+    // Who moves the slider wants its speed, fine or not.
+    speed: ({ speed: wanted }) => setSpeed({ speed: wanted, fine: false }),
+    "reset-scene": askResetScene,
     help: () => {
         if (sheets.name === "help") sheets.close();
         else sheets.show("help", texts.help.title, helpContent(checkBrowser));

@@ -121,6 +121,37 @@ def test_stop_latches_until_reset_and_arming(
     wait_for(page, "window.farhand.robot.mode === 'moving'")
 
 
+def test_speed_and_fine_reach_the_robot_are_remembered_and_leave_the_stop_key_alone(
+    server: Server, open_page: OpenPage, showing_up: Path
+) -> None:
+    page = open_page(server.link, webcam=showing_up)
+    assert page.is_hidden("#speed")
+    start_driving(page)
+    page.keyboard.press("f")
+    wait_for(page, "window.farhand.robot.scale === 0.2")
+    expect(page.locator("#speed-value")).to_have_text("20%")
+    expect(page.locator("#fine")).to_have_attribute("aria-pressed", "true")
+    page.click("#fine")
+    wait_for(page, "window.farhand.robot.scale === 1")
+    page.focus("#speed")
+    page.keyboard.press("ArrowLeft")
+    wait_for(page, "window.farhand.robot.scale === 0.95")
+    page.keyboard.press("Space")
+    wait_for(page, "window.farhand.robot.mode === 'stopped'")
+
+    page.reload()
+    wait_for(page, "window.farhand?.state.speed === 0.95")
+
+
+def test_things_are_put_back_when_asked_twice(server: Server, open_page: OpenPage) -> None:
+    page = open_page(server.link)
+    wait_for(page, "window.farhand?.robot?.mode === 'disarmed'")
+    page.click("#btn-reset-scene")
+    expect(page.locator("#sheet-reset-scene")).to_contain_text("The arm does not move")
+    page.click("#sheet-reset-scene [data-part=yes]")
+    expect(page.locator(".notice.good")).to_have_text("Everything is back in its place.")
+
+
 def test_a_killed_node_is_shown_and_comes_back_disarmed(
     server: Server, open_page: OpenPage, showing_up: Path
 ) -> None:

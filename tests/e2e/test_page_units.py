@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 from playwright.sync_api import Page, Playwright
@@ -17,6 +17,8 @@ from playwright.sync_api import Page, Playwright
 from app.gateway.messages import CLIENT_MESSAGES, SERVER_MESSAGES
 from app.link.actions import ACTION
 from app.link.header import HEADER_SIZE, FrameHeader
+from app.link.messages import Doubt
+from app.robot.controller import DOUBTS
 from tests.e2e.running import BASE_ARGUMENTS
 
 STATIC = Path(__file__).parents[2] / "app" / "static"
@@ -260,3 +262,60 @@ def test_the_check_finds_what_is_missing(modules: Page) -> None:
     assert list(found) == ["socket", "camera", "webgl"]
     assert found["socket"] == "blocked"
     assert found["camera"] in ("denied", "none")
+
+
+def holding(doubt: str | None, reason: str) -> dict[str, Any]:
+    """A store of one who drives an arm that holds still."""
+    return {
+        "connection": {"state": "open"},
+        "hello": {"session": "me"},
+        "robot": {
+            "mode": "holding", "armed": True, "controller": "me", "online": True,
+            "doubt": doubt, "reason": reason,
+        },
+        "source": {"state": "running"},
+    }  # fmt: skip
+
+
+def test_every_doubt_is_told_in_words_of_its_own(modules: Page) -> None:
+    told = {
+        doubt: run(
+            modules, "ui/sentence.js", "return m.sentenceFor(a, 100)", holding(doubt, DOUBTS[doubt])
+        )
+        for doubt in get_args(Doubt)
+    }
+    assert len(set(told.values())) == len(told)
+    for doubt, sentence in told.items():
+        assert sentence.startswith("Holding still: your ") or doubt in (
+            "two_hands",
+            "stale_picture",
+        ), sentence
+        assert sentence.endswith(". Show no gesture for half a second, then show it again."), (
+            sentence
+        )
+    silent = "no command in time: the picture or the link failed"
+    assert run(
+        modules, "ui/sentence.js", "return m.sentenceFor(a, 100)", holding(None, silent)
+    ).startswith(f"Holding still: {silent}. ")
+
+
+def test_the_speed_is_what_slider_and_fine_say_and_nonsense_is_the_ordinary(modules: Page) -> None:
+    script = "return a.map((state) => m.speedOf(state))"
+    states = [{"speed": s, "fine": f} for s, f in ((1, False), (0.5, True), (0.1, True))]
+    assert run(modules, "ui/speed.js", script, states) == [1, 0.2, 0.1]
+    known = run(
+        modules,
+        "ui/speed.js",
+        "return a.map(m.knownSpeed)",
+        [None, "", "x", "0.04", "7", "0.35", "NaN"],
+    )
+    assert known == [1, 1, 1, 1, 1, 0.35, 1]
+
+
+def test_a_slider_is_no_field_that_swallows_the_stop_key(modules: Page) -> None:
+    script = (
+        "const host = document.createElement('div');"
+        "host.append(...a.map((type) => Object.assign(document.createElement('input'), {type})));"
+        "return [...host.children].map(m.isField)"
+    )
+    assert run(modules, "ui/dom.js", script, ["text", "number", "range"]) == [True, True, False]

@@ -21,6 +21,7 @@ from app.gateway.serve import bind, make_server
 from app.link.header import FrameHeader
 from app.link.messages import (
     CameraDescription,
+    Clearance,
     Command,
     Description,
     JointDescription,
@@ -28,6 +29,7 @@ from app.link.messages import (
     LeaseRequest,
     State,
     StopRequest,
+    Transition,
     key,
 )
 from app.link.node_end import NodeEnd
@@ -176,6 +178,15 @@ def running(settings: Settings) -> Iterator[Running]:
             raise failed[0]
 
 
+NEAR = Clearance(
+    distance=0.05,
+    link="link3",
+    thing="table",
+    itself=False,
+    points=((0.5, 0.0, 0.3), (0.5, 0.0, 0.25)),
+)
+
+
 class StandIn:
     """Speaks for a robot node in this process: the same link, the same answers, no arm.
 
@@ -242,6 +253,10 @@ class StandIn:
             case "reset":
                 self.mode = "disarmed"
                 return LeaseReply(granted=True)
+            case "reset_scene":
+                if self.mode not in ("disarmed", "stopped"):
+                    return LeaseReply(granted=False, code="armed", reason="disarm it first")
+                return LeaseReply(granted=True)
         if not mine:
             return LeaseReply(granted=False, code="no_control", reason="you do not have control")
         match request.kind:
@@ -272,6 +287,9 @@ class StandIn:
             tool_position=(0.5, 0.0, 0.3),
             tool_orientation=(1.0, 0.0, 0.0, 0.0),
             frame=self.frame,
+            clearance=NEAR,
+            transitions=(Transition(number=1, tick=5, before="disarmed", after="armed"),),
+            dropped={"epoch": 3},
         )
 
     def describe(self) -> Description:

@@ -427,7 +427,7 @@ def test_guesses_are_refused_from_the_sixth_and_disturb_nobody(server: Running) 
                 for number in range(300)
             ]
             answers += [client.get("/", params={"token": f"link-{n}"}) for n in range(100)]
-            answers += [client.post("/signin", data={"token": f"link-{n}"}) for n in range(100)]
+            answers += [client.post("/signin", data={"token": f"form-{n}"}) for n in range(100)]
         assert [answer.status_code for answer in answers] == [401] * 5 + [429] * 495
         assert all(a.json()["error"]["code"] == "too_many_guesses" for a in answers[5:])
         assert answers[5].headers["retry-after"] == "60"

@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from app.gateway.drive import Driver, Lease, Situation
+from app.gateway.drive import FROZEN, Driver, Lease, Situation
 from app.gateway.numbers import Counter, newer
 from app.link.actions import Gripper, Home, JogCartesian, Sequence, Stop, TurnJoint
 from app.link.messages import State
+from app.pipeline.types import Cause
 
 ACTIONS = {
     "forward": JogCartesian(linear=(0.1, 0.0, 0.0)),
@@ -273,6 +274,60 @@ def test_a_jog_under_way_goes_on_when_other_gestures_change(driver: Driver) -> N
     decision = driver.decide("forward", 2, at(0.1))
     assert decision.command is not None
     assert decision.command.action == ACTIONS["forward"]
+
+
+@pytest.mark.parametrize("cause", ["no_hand", "unknown_hand", "two_hands", "low_margin"])
+def test_why_no_gesture_is_held_any_more_is_told_to_the_robot(driver: Driver, cause: Cause) -> None:
+    held = driver.decide("forward", 1, READY, cause=cause)
+    assert held.command is not None
+    # One bad frame ends nothing while the gesture is held.
+    assert (held.command.action, held.command.doubt) == (ACTIONS["forward"], None)
+    let_go = driver.decide(None, 2, READY, cause=cause)
+    assert let_go.command is not None
+    assert (let_go.command.action, let_go.command.doubt) == (None, cause)
+    assert let_go.doubt == cause
+
+
+@pytest.mark.parametrize("cause", ["moving", "waiting", "nothing_enrolled", None])
+def test_a_hand_on_its_way_is_no_doubt(driver: Driver, cause: Cause | None) -> None:
+    command = driver.decide(None, 1, READY, cause=cause).command
+    assert command is not None
+    assert command.doubt is None
+
+
+BLIND = {
+    "frozen": (READY, True, FROZEN),
+    "stale_picture": (replace(READY, unseen="it is 2 s old"), False, "it is 2 s old"),
+}
+
+
+@pytest.mark.parametrize("doubt", BLIND)
+def test_a_held_gesture_moves_nothing_while_a_picture_stands(driver: Driver, doubt: str) -> None:
+    situation, frozen, reason = BLIND[doubt]
+    driver.decide("forward", 1, READY)
+    decision = driver.decide("forward", 2, situation, frozen=frozen)
+    command = decision.command
+    assert command is not None
+    assert (command.action, command.gesture, command.doubt) == (None, "forward", doubt)
+    assert (decision.reason, command.reason) == (reason, reason)
+    # Nor once the picture lives again, until the gesture is shown again.
+    again = driver.decide("forward", 3, READY).command
+    assert again is not None
+    assert (again.action, again.doubt) == (None, None)
+    # A picture without a gesture that stands still threatens nobody.
+    none = driver.decide(None, 4, situation, frozen=frozen).command
+    assert none is not None
+    assert none.doubt is None
+
+
+def test_a_stop_counts_with_a_frozen_picture_too(driver: Driver) -> None:
+    assert driver.decide("stop", 1, READY, frozen=True).stop is not None
+
+
+def test_the_wanted_speed_goes_along(driver: Driver) -> None:
+    command = driver.decide("forward", 1, replace(READY, scale=0.2)).command
+    assert command is not None
+    assert command.scale == 0.2
 
 
 def test_a_long_fault_does_not_break_the_command(driver: Driver) -> None:

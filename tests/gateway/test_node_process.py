@@ -1,6 +1,8 @@
 """The supervisor, with small real processes."""
 
 import os
+import signal
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -60,6 +62,45 @@ def test_a_child_that_stops_speaking_is_killed_and_started_again() -> None:
         assert not psutil.pid_exists(first)
     finally:
         process.close()
+
+
+def test_a_gateway_that_was_stopped_itself_does_not_blame_the_node() -> None:
+    """SIGSTOP of the supervisor, SIGCONT: what the node said meanwhile is read only now."""
+    script = (
+        "import sys, threading, time\n"
+        "from app.gateway.node_process import NodeProcess\n"
+        "spoken = time.monotonic()\n"
+        "words = threading.Event()\n"
+        "def last_word():\n"
+        "    return time.monotonic() if words.is_set() else spoken + 0.01\n"
+        "child = [sys.executable, '-c', 'import time; time.sleep(60)']\n"
+        "process = NodeProcess(child, last_word=last_word, hung_s=3.0, start_s=30)\n"
+        "process.start()\n"
+        "spoken = time.monotonic() + 1\n"
+        "print('runs', flush=True)\n"
+        "sys.stdin.readline()\n"
+        "time.sleep(0.3)\n"  # the supervisor is first to run after the pause
+        "words.set()\n"
+        "time.sleep(0.3)\n"
+        "print(process.restarts, flush=True)\n"
+        "process.close()\n"
+    )
+    gateway = subprocess.Popen(
+        [sys.executable, "-c", script],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env=node_environment(),
+    )
+    with gateway:
+        assert gateway.stdin is not None
+        assert gateway.stdout is not None
+        assert gateway.stdout.readline() == "runs\n"
+        gateway.send_signal(signal.SIGSTOP)
+        time.sleep(4.5)
+        gateway.send_signal(signal.SIGCONT)
+        print(file=gateway.stdin, flush=True)
+        assert gateway.stdout.readline() == "0\n"
 
 
 def test_a_child_that_never_speaks_is_started_again() -> None:

@@ -554,3 +554,111 @@ def test_too_many_sessions_are_turned_away(node: StandIn, folder: Path) -> None:
             assert closed.value.rcvd.code == 1013
         wait_for(lambda: not server.hub.sessions, "the session to be over")
         server.operator().close()
+
+
+def noisy(jpeg: bytes, seed: int) -> bytes:
+    """The picture as another frame of a real sensor would give it."""
+    picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+    assert picture is not None
+    noise = np.random.default_rng(seed).normal(0, 1.5, picture.shape)
+    noised = np.clip(picture + noise, 0, 255).astype(np.uint8)
+    return cv2.imencode(".jpg", noised, [cv2.IMWRITE_JPEG_QUALITY, 85])[1].tobytes()
+
+
+def test_a_webcam_that_freezes_moves_nothing_any_more(
+    server: Running, node: StandIn, hand: Hand
+) -> None:
+    with server.operator() as operator:
+        take_and_arm(operator)
+        nothing, shown = ([noisy(hand(what), n) for n in range(6)] for what in (None, "forward"))
+        for n in range(15):
+            operator.show(nothing[n % 6])
+            time.sleep(0.02)
+        for n in range(200):
+            if operator.show(shown[n % 6])["gesture"] == "forward":
+                break
+            time.sleep(0.02)
+        message = show_until(operator, shown[0], lambda frame: frame["doubt"] == "frozen")
+        assert message["gesture"] == "forward"
+        assert message["reason"] == "the webcam picture is frozen"
+        command = wait_for(lambda: node.commands[-1].doubt == "frozen" and node.commands[-1], "")
+        assert (command.action, command.gesture) == (None, "forward")
+        # A hand that is gone from a living picture is told as such.
+        show_until(operator, hand(None), lambda frame: frame["doubt"] == "no_hand")
+        wait_for(lambda: node.commands[-1].doubt == "no_hand", "the reason at the robot")
+
+
+def test_one_picture_shown_again_and_again_is_no_frozen_webcam(
+    server: Running, node: StandIn, hand: Hand
+) -> None:
+    with server.operator() as operator:
+        take_and_arm(operator)
+        rest(operator, hand(None))
+        show_until(operator, hand("forward"), lambda frame: frame["gesture"] == "forward")
+        began = time.monotonic()
+        while time.monotonic() - began < 0.8:
+            assert operator.show(hand("forward"))["doubt"] is None
+            time.sleep(0.03)
+        wait_for(lambda: node.commands[-1].action is not None, "the action")
+
+
+def test_who_sees_an_old_picture_of_the_robot_moves_nothing(
+    server: Running, node: StandIn, hand: Hand
+) -> None:
+    with server.operator() as operator:
+        take_and_arm(operator)
+        rest(operator, hand(None))
+        operator.send("picture", camera="wrist", tick=node.state().tick)
+        show_until(operator, hand("forward"), lambda frame: frame["gesture"] == "forward")
+        message = show_until(
+            operator, hand("forward"), lambda frame: frame["doubt"] == "stale_picture"
+        )
+        assert message["reason"].startswith("the picture of the robot that you see is 1.")
+        wait_for(lambda: node.commands[-1].doubt == "stale_picture", "the reason at the robot")
+        operator.send("picture", camera="scene", tick=node.state().tick)
+        show_until(operator, hand("forward"), lambda frame: frame["doubt"] is None)
+
+
+def test_the_speed_that_is_asked_for_goes_to_the_robot(
+    server: Running, node: StandIn, hand: Hand
+) -> None:
+    with server.operator() as operator:
+        take_and_arm(operator)
+        operator.show(hand(None))
+        wait_for(lambda: node.commands and node.commands[-1].scale == 1.0, "the ordinary speed")
+        operator.send("speed", scale=0.2)
+        operator.show(hand(None))
+        wait_for(lambda: node.commands[-1].scale == 0.2, "the lower speed")
+        for wrong in (0.0, 1.5, "fast"):
+            operator.send("speed", scale=wrong)
+            assert operator.next("error")["code"] == "message_values"
+
+
+def test_the_robot_message_tells_what_the_supervisor_and_the_limits_do(server: Running) -> None:
+    with server.operator() as operator:
+        robot = operator.next("robot")
+    assert robot["doubt"] is None
+    assert robot["scale"] == 1.0
+    assert robot["commanded"] == [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
+    assert robot["clearance"]["thing"] == "table"
+    assert robot["clearance"]["distance"] == 0.05
+    assert robot["transitions"] == [
+        {"number": 1, "tick": 5, "before": "disarmed", "after": "armed", "stop": None,
+         "reason": None},
+    ]  # fmt: skip
+    assert robot["dropped"] == {"epoch": 3}
+
+
+def test_things_are_put_back_over_rest_unless_the_robot_is_armed(
+    server: Running, node: StandIn
+) -> None:
+    answer = server.http.post("/api/robots/puma/scene/reset")
+    assert answer.status_code == 200
+    assert answer.json()["mode"] == "disarmed"
+    assert [request.kind for request in node.requests] == ["reset_scene"]
+    with server.operator() as operator:
+        take_and_arm(operator)
+        refused = server.http.post("/api/robots/puma/scene/reset")
+    assert refused.status_code == 409
+    assert refused.json()["error"]["code"] == "armed"
+    assert server.http.post("/api/robots/moon/scene/reset").status_code == 404

@@ -106,7 +106,7 @@ def test_everything_that_changes_or_moves_something_is_the_operators() -> None:
         "WEBSOCKET /viser/",
     }  # fmt: skip
     assert {kind for kind, access in MESSAGES.items() if access != "operator"} == {
-        "stop", "view", "ping",
+        "stop", "view", "ping", "speed", "picture",
     }  # fmt: skip
 
 
@@ -363,5 +363,5 @@ def test_what_is_open_ends_with_its_token(server: Running, node: StandIn) -> Non
 
 
 def test_messages_of_the_table_are_messages() -> None:
-    for kind in set(MESSAGES) - {FRAME, "view", "ping"}:
+    for kind in set(MESSAGES) - {FRAME, "view", "ping", "speed", "picture"}:
         assert parse_client_message(json.dumps({"type": kind})).type == kind

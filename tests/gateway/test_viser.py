@@ -4,11 +4,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import httpx
+import numpy as np
 import pytest
 import viser
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from tests.gateway.running import Running, StandIn, running, settings_for, wait_for
+from app.gateway.viser_aids import box_edges
+from tests.gateway.running import NEAR, Running, StandIn, running, settings_for, wait_for
 
 PROTOCOL = f"viser-v{viser.__version__}"
 
@@ -81,3 +83,33 @@ def test_viser_that_has_gone_is_told_and_hurts_nothing(with_viser: Running) -> N
         with_viser.socket("/viser", subprotocols=[PROTOCOL])
     assert refused.value.response.status_code == 503
     assert with_viser.http.get("/api/gestures").status_code == 200
+
+
+def test_the_ghost_shows_only_where_the_arm_is_not_where_it_should_be(
+    with_viser: Running,
+) -> None:
+    scene = with_viser.hub.viser
+    assert scene is not None
+    wait_for(lambda: scene.shown_tick, "the scene to be built", 60)
+    assert scene.aids is not None
+    assert not scene.aids.ghost_shown
+    assert scene.aids.told == "50 mm to table"
+    # Nobody looks, so that only this test updates the scene from now on.
+    actual = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.02])
+    scene.aids.update(actual, actual + 0.01, NEAR)
+    assert not scene.aids.ghost_shown
+    scene.aids.update(actual, actual + 0.1, None)
+    assert scene.aids.ghost_shown
+    assert scene.aids.told is None
+    scene.aids.update(actual, actual, NEAR.model_copy(update={"distance": 0.0124}))
+    assert not scene.aids.ghost_shown
+    assert scene.aids.told == "12 mm to table"
+
+
+def test_the_box_has_its_twelve_edges() -> None:
+    edges = box_edges((0.0, 0.0, 0.0), (1.0, 2.0, 3.0))
+    assert edges.shape == (12, 2, 3)
+    lengths = np.abs(edges[:, 1] - edges[:, 0])
+    assert sorted(lengths.sum(axis=1).tolist()) == [1.0] * 4 + [2.0] * 4 + [3.0] * 4
+    assert (np.count_nonzero(lengths, axis=1) == 1).all()
+    assert len({tuple(map(tuple, edge)) for edge in edges.tolist()}) == 12

@@ -15,6 +15,7 @@ PARTS = {
     "JointDescription",
     "CameraDescription",
     "ObjectDescription",
+    "WorkspaceDescription",
 }
 """Not sent by themselves, only inside others."""
 

@@ -30,3 +30,9 @@ def two_hands():
     """Two hands side by side."""
     left, right = hand("stop", 200.0, (180.0, 240.0)), hand("up", 200.0, (460.0, 240.0))
     return np.hstack([left[:, :320], right[:, 320:]])
+
+
+def noisy(picture, seed: int, amount: float = 2.0):
+    """The picture with the noise of a sensor."""
+    noise = np.random.default_rng(seed).normal(0.0, amount, picture.shape)
+    return np.clip(picture + noise, 0, 255).astype(np.uint8)

@@ -112,6 +112,22 @@ def test_a_threshold_that_the_network_agrees_with_is_proved_now_and_then():
     assert asked.index(True) == PROVE_EVERY
 
 
+def test_a_piece_unlike_the_proved_one_needs_a_proof_of_its_own():
+    choose, hand = Choose(BinariseSettings()), draw_mask("five")
+    choose(draw("five"))
+    choose.found(1000)
+    assert choose.prove(hand, hand) is None
+    for area, unproved in [(1000, False), (1400, False), (700, False), (1600, True)]:
+        choose.found(area)
+        assert choose.unproved is unproved, area
+    choose.prove(hand, hand)
+    choose.found(1600)
+    assert not choose.unproved
+    choose.found(0)  # no hand: whatever comes next is new
+    choose.found(1600)
+    assert choose.unproved
+
+
 def test_a_threshold_that_finds_other_things_is_not_tried_for_a_while():
     choose, hand = Choose(BinariseSettings()), draw_mask("five")
     choose(draw("five"))

@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 from app.config import PipelineSettings
 from app.errors import FrameRefused
 from app.pipeline import STAGES, Gallery, PcaMatcher, Pipeline
+from app.pipeline.still import extract_template
+from tests.pipeline import shots
 from tests.pipeline.drawing import SETTINGS, TURNS, draw, draw_mask, gallery, jpeg, matcher
 
 MATCHER = matcher()
@@ -154,6 +156,16 @@ def test_timing_names_every_stage():
     assert sum(timing.values()) == pytest.approx(total, abs=0.5)
 
 
+def test_results_tell_how_often_the_network_ran():
+    """On the first frame of all, and not on the next, which shows the same."""
+    learned = pipeline(binarise=SETTINGS.binarise.model_copy(update={"mode": "learned"}))
+    first, second = show(learned, [jpeg(draw("two"))] * 2)
+    assert first.looks >= 1
+    assert second.looks == 0
+    threshold = pipeline(binarise=SETTINGS.binarise.model_copy(update={"mode": "threshold"}))
+    assert show(threshold, [jpeg(draw("two"))])[0].looks == 0
+
+
 def test_message_is_plain_json():
     result = show(pipeline(), [jpeg(draw("two"))] * 10)[-1]
     message = json.loads(json.dumps(result.as_message(tick=7), allow_nan=False))
@@ -227,3 +239,62 @@ def test_changed_bytes_raise_nothing_but_refusals(changes):
             pipe(bytes(data), seq=n, now=n / 30)
         except FrameRefused:
             return
+
+
+def test_why_nothing_is_shown_has_a_word_for_programs():
+    still = [jpeg(draw("two"))] * 10
+    assert [r.cause for r in show(pipeline(), [WALL] * 4)] == ["no_hand"] * 4
+    results = show(pipeline(), still)
+    assert [r.cause for r in results[:2]] == ["waiting", "waiting"]
+    assert results[-1].cause is None
+    strict = pipeline(match=SETTINGS.match)
+    strict.matcher = PcaMatcher.fit(
+        gallery(("fist", "one", "five"), SETTINGS),
+        SETTINGS.match.model_copy(update={"max_distance": 1e-3, "min_reach": 0.0}),
+    )
+    assert show(strict, still)[-1].cause == "unknown_hand"
+    close = pipeline()
+    close.matcher = PcaMatcher.fit(
+        gallery(("fist", "one", "five"), SETTINGS),
+        SETTINGS.match.model_copy(update={"min_margin": 100.0, "max_distance": 100.0}),
+    )
+    undecided = show(close, [jpeg(draw("one"))] * 10)[-1]
+    assert undecided.cause == "low_margin"
+    assert undecided.reason.startswith("undecided: ")
+    empty = pipeline()
+    empty.matcher = PcaMatcher.fit(Gallery.empty(), SETTINGS.match)
+    assert show(empty, still)[-1].cause == "nothing_enrolled"
+    moving = [jpeg(draw("two", shift=(12 * n, 0))) for n in range(6)]
+    assert show(pipeline(), moving)[-1].cause == "moving"
+
+
+@pytest.mark.parametrize("mode", ["threshold", "learned"])
+def test_a_second_hand_ends_the_gesture_and_says_so(mode):
+    everything = PipelineSettings()
+    binarise = everything.binarise.model_copy(update={"mode": mode})
+    motion = everything.motion.model_copy(update={"settle_s": 0.0})
+    chosen = everything.model_copy(update={"binarise": binarise, "motion": motion})
+    one = shots.hand("stop", 200.0, (180.0, 240.0))
+    template = extract_template(shots.jpeg(one), chosen).template
+    lax = chosen.match.model_copy(update={"calibrate": False, "max_distance": 9, "max_error": 9})
+    pipe = Pipeline(chosen, PcaMatcher.fit(Gallery(("stop",), template[None]), lax))
+    # Nothing stands still in front of a real camera, or the last mask would be taken again.
+    alone = [shots.jpeg(shots.noisy(one, n)) for n in range(15)]
+    both = [shots.jpeg(shots.noisy(shots.two_hands(), n)) for n in range(25)]
+    results = show(pipe, alone)
+    assert (results[-1].gesture, results[-1].cause) == ("stop", None)
+    results = show(pipe, both, 15)
+    assert results[-1].cause == "two_hands"
+    assert results[-1].reason == "two hands in the picture: show one"
+    assert results[-1].gesture is None
+    assert "end" in [r.event.phase for r in results if r.event]
+    assert show(pipe, alone, 40)[-1].gesture == "stop"
+
+
+def test_the_digest_tells_whether_any_pixel_changed():
+    pipe = pipeline()
+    picture = draw("two")
+    changed = picture.copy()
+    changed[::7, ::5] ^= 8
+    first, same, other = show(pipe, [jpeg(picture), jpeg(picture), jpeg(changed)])
+    assert first.digest == same.digest != other.digest

@@ -46,6 +46,22 @@ def test_nothing_starts_while_somebody_moves():
     assert play(acts.turning(studio(2))).false_starts == []
 
 
+@pytest.mark.parametrize("seed", [1, 4])
+def test_a_wall_darker_to_one_side_is_no_gesture_once_the_hand_has_left_it(seed):
+    one = studio(seed)
+    person = Drawn.of(one.generator)
+    hand = person.cut(person.pose("left"))
+    pipeline = Pipeline(SETTINGS, PcaMatcher.fit(GALLERY, SETTINGS.match))
+    shown = [one.shoot((hand, (0.0, 0.0))) for _ in range(110)] + [one.shoot() for _ in range(40)]
+    results = [
+        pipeline(measure.to_jpeg(picture), seq=seq, now=seq / FPS)
+        for seq, picture in enumerate(shown)
+    ]
+    # By the threshold, which finds two halves of the wall when there is nothing else.
+    assert (results[109].way.mode, results[109].gesture) == ("threshold", "left")
+    assert {result.match for result in results[112:]} == {None}
+
+
 @pytest.mark.parametrize("name", ["up", "stop"])
 def test_nothing_starts_while_the_hand_never_rests(name):
     one = studio(3)

@@ -1,81 +1,13 @@
+from typing import get_args
+
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, settings
-from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from app.config import ArmMotionSettings
 from app.link.actions import Action, Gripper, Home, JogCartesian, JogJoint, Pose, Stop, TurnJoint
-from app.link.messages import Command, LeaseReply, LeaseRequest, State, StopRequest
-from app.robot.controller import DT, Controller, tick_of
+from app.link.messages import Doubt, State, StopRequest
+from app.robot.controller import DOUBTS, DT, tick_of
 from app.robot.latch import StopLatch
-from tests.robot.fakes import FakeArm
-
-JOG = JogJoint(joint=1, velocity=1.0)
-
-
-class Operator:
-    """A controller with a fake arm, a clock of its own, and somebody who drives it."""
-
-    def __init__(self, latch: StopLatch | None = None) -> None:
-        self.arm = FakeArm()
-        self.now = 1000.0
-        self.controller = Controller(
-            self.arm, "puma", ArmMotionSettings(), latch or StopLatch(None), self.now
-        )
-        self.epoch = 0
-        self.sequence = 0
-
-    @property
-    def state(self) -> State:
-        return self.controller.state(self.now)
-
-    def ask(self, kind: str, holder: str = "anna", **more: object) -> LeaseReply:
-        request = LeaseRequest(kind=kind, holder=holder, epoch=self.epoch, **more)
-        reply = self.controller.answer(request, self.now)
-        if kind == "take" and reply.granted:
-            assert reply.epoch is not None
-            self.epoch = reply.epoch
-        return reply
-
-    def command(self, action: Action | None, hold: int, **more: object) -> Command:
-        self.sequence += 1
-        values = {
-            "epoch": self.epoch,
-            "sequence": self.sequence,
-            "tick": tick_of(self.now),
-            "frame": self.sequence,
-            "hold": hold,
-            "gesture": None if action is None else action.type,
-            "action": action,
-        }
-        return Command(**(values | more))
-
-    def wait(self, seconds: float) -> None:
-        for _ in range(round(seconds / DT)):
-            self.now += DT
-            self.controller.cycle(self.now)
-
-    def show(self, action: Action | None, hold: int, seconds: float) -> None:
-        """A command every eighth cycle, 30 a second."""
-        for count in range(round(seconds / DT)):
-            self.now += DT
-            commands = [self.command(action, hold)] if count % 8 == 0 else []
-            self.controller.cycle(self.now, commands)
-
-    def ready(self) -> "Operator":
-        assert self.ask("take").granted
-        assert self.ask("arm").granted
-        self.show(None, 0, 0.6)
-        assert self.state.mode == "armed"
-        return self
-
-    def standstill_after(self, limit: float = 1.0) -> float:
-        for count in range(round(limit / DT)):
-            if not self.arm.velocities.any() and not self.controller.motion.busy:
-                return count * DT
-            self.wait(DT)
-        raise AssertionError("still moving")
+from tests.robot.operator import JOG, Operator
 
 
 def test_a_node_begins_disarmed_with_brakes_on() -> None:
@@ -189,7 +121,7 @@ def test_a_turn_ends_at_its_angle_and_does_not_repeat_until_a_new_hold() -> None
 def test_the_next_gesture_begins_when_the_arm_has_come_to_rest() -> None:
     operator = Operator().ready()
     operator.show(JOG, 1, 0.5)
-    operator.show(JogCartesian(linear=(0.0, 0.0, 0.1)), 2, 1.0)
+    operator.show(JogCartesian(linear=(0.0, 0.0, 0.1)), 2, 1.5)
     assert operator.arm.read().tool.position[2] > 0.75
     steps = np.diff([joints for joints, _ in operator.arm.moves], axis=0)
     assert np.abs(np.diff(steps, axis=0)).max() < 40 * DT**2
@@ -378,93 +310,146 @@ def test_the_gripper_moves_while_held() -> None:
     assert 0.03 < operator.arm.width < 0.06
 
 
-class AnyOrder(RuleBasedStateMachine):
-    """Whatever happens in whatever order: moving needs everything at once."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.it = Operator()
-        self.hold = 0
-        self.holders = {"anna": 0, "ben": 0}
-        self.last_valid = -1.0
-        self.was_moving = False
-
-    @rule(holder=st.sampled_from(["anna", "ben"]), takeover=st.booleans())
-    def take(self, holder: str, takeover: bool) -> None:
-        if self.it.ask("take", holder=holder, takeover=takeover).granted:
-            self.holders[holder] = self.it.epoch
-
-    @rule(
-        holder=st.sampled_from(["anna", "ben"]),
-        kind=st.sampled_from(["renew", "release", "arm", "arm", "disarm", "reset"]),
-    )
-    def ask(self, holder: str, kind: str) -> None:
-        self.it.controller.answer(
-            LeaseRequest(kind=kind, holder=holder, epoch=self.holders[holder]), self.it.now
-        )
-
-    @rule(category=st.sampled_from(["S0", "S1", "S2"]))
-    def stop(self, category: str) -> None:
-        before = self.it.state.stops
-        self.it.controller.stop(StopRequest(category=category, source="test", reason="x"))
-        assert self.it.state.stops == before + 1
-        assert not self.it.controller.safety.may_move
-
-    @rule(
-        holder=st.sampled_from(["anna", "ben"]),
-        new=st.booleans(),
-        seconds=st.floats(0.02, 0.8),
-        action=st.sampled_from([JOG, None, None, TurnJoint(joint=2, angle=0.2), Home(), Stop()]),
-    )
-    def show(self, holder: str, new: bool, seconds: float, action: Action | None) -> None:
-        self.hold += new
-        self.it.epoch = self.holders[holder]
-        controller = self.it.controller
-        for count in range(round(seconds / DT)):
-            self.it.now += DT
-            commands = [self.it.command(action, self.hold)] if count % 8 == 0 else []
-            dropped = sum(controller.gate.dropped.values())
-            controller.cycle(self.it.now, commands)
-            if commands and sum(controller.gate.dropped.values()) == dropped:
-                self.last_valid = self.it.now
-            self.check()
-
-    @rule(seconds=st.floats(0.01, 2.5))
-    def wait(self, seconds: float) -> None:
-        for _ in range(round(seconds / DT)):
-            self.it.wait(DT)
-            self.check()
-
-    @precondition(lambda self: self.it.controller.safety.phase.value == "disarmed")
-    @rule()
-    def get_ready(self) -> None:
-        if self.it.ask("take").granted:
-            self.holders["anna"] = self.it.epoch
-            self.it.ask("arm")
-            self.show("anna", True, 0.7, None)
-            self.show("anna", True, 0.4, JOG)
-
-    @invariant()
-    def check(self) -> None:
-        state = self.it.state
-        silent = self.it.now - self.last_valid
-        if state.mode == "moving":
-            assert state.armed
-            assert state.stop is None
-            assert state.controller is not None
-            assert silent <= 0.25 + 2 * DT
-        if silent > 0.25 + 0.2 + 3 * DT:
-            assert not self.it.arm.velocities.any()
-        if state.mode in ("stopped", "disarmed"):
-            assert not state.armed
-        if self.it.arm.braked:
-            assert not self.it.arm.velocities.any()
+def doubted(operator: Operator, doubt: str, seconds: float = 0.1, **more: object) -> None:
+    """Commands that doubt what the operator shows or sees, 30 a second."""
+    for count in range(round(seconds / DT)):
+        operator.now += DT
+        commands = [operator.command(None, 1, doubt=doubt, **more)] if count % 8 == 0 else []
+        operator.controller.cycle(operator.now, commands)
 
 
-AnyOrder.TestCase.settings = settings(
-    max_examples=200,
-    stateful_step_count=12,
-    deadline=None,
-    suppress_health_check=[HealthCheck.too_slow],
+@pytest.mark.parametrize("doubt", ["no_hand", "unknown_hand", "two_hands", "low_margin"])
+def test_a_hand_that_is_not_sure_any_more_holds_the_arm_still(doubt: str) -> None:
+    operator = Operator().ready()
+    operator.show(JOG, 1, 0.4)
+    doubted(operator, doubt)
+    state = operator.state
+    assert (state.mode, state.stop, state.doubt, state.armed) == ("holding", "S2", doubt, True)
+    assert state.reason == DOUBTS[doubt]
+    assert operator.standstill_after() <= 0.2
+    # Only a new gesture after half a second of none goes on.
+    operator.show(JOG, 2, 0.3)
+    assert operator.state.mode == "holding"
+    operator.show(None, 2, 0.6)
+    assert (operator.state.mode, operator.state.doubt) == ("armed", None)
+    operator.show(JOG, 3, 0.3)
+    assert operator.state.mode == "moving"
+
+
+@pytest.mark.parametrize("doubt", ["frozen", "stale_picture"])
+def test_eyes_that_see_nothing_new_hold_the_arm_still_although_the_gesture_is_held(
+    doubt: str,
+) -> None:
+    operator = Operator().ready()
+    operator.show(JOG, 1, 0.4)
+    # Half a second without an action, but not without a gesture.
+    doubted(operator, doubt, 1.0, gesture="jog_joint", reason="x")
+    state = operator.state
+    assert (state.mode, state.stop, state.doubt) == ("holding", "S2", doubt)
+    assert not operator.arm.velocities.any()
+    operator.show(JOG, 1, 0.3)
+    assert not operator.arm.velocities.any()
+
+
+def test_every_doubt_has_words_of_its_own() -> None:
+    assert set(DOUBTS) == set(get_args(Doubt))
+    assert len(set(DOUBTS.values())) == len(DOUBTS)
+
+
+def test_a_doubt_without_an_action_under_way_stops_nothing() -> None:
+    operator = Operator().ready()
+    doubted(operator, "no_hand", 0.3)
+    assert operator.state.mode == "armed"
+    turn = TurnJoint(joint=1, angle=0.1)
+    operator.show(turn, 1, 2.0)  # ends by itself
+    doubted(operator, "unknown_hand", 0.3)
+    assert operator.state.mode == "armed"
+    operator.show(JOG, 2, 0.4)
+    operator.show(None, 2, 0.02)  # let go: a hand that goes on to the next gesture
+    doubted(operator, "unknown_hand", 0.1)
+    assert operator.state.mode in ("moving", "armed")
+    operator.show(JogJoint(joint=2, velocity=0.3), 3, 0.5)
+    assert operator.state.mode == "moving"
+
+
+def test_another_stop_is_not_told_as_the_doubt_before_it() -> None:
+    operator = Operator().ready()
+    operator.show(JOG, 1, 0.4)
+    doubted(operator, "no_hand", 0.1)
+    operator.controller.stop(StopRequest(category="S2", source="page", reason="wait"))
+    assert (operator.state.doubt, operator.state.reason) == (None, "wait (page)")
+
+
+def test_the_speed_follows_the_scale_smoothly() -> None:
+    operator = Operator().ready()
+    velocities, wanted = [], JogJoint(joint=1, velocity=1.0)
+    for scale, expected in [(0.2, 0.2), (1.0, 1.0), (0.05, 0.05), (0.5, 0.5)]:
+        for count in range(round(0.8 / DT)):
+            operator.now += DT
+            commands = [operator.command(wanted, 1, scale=scale)] if count % 8 == 0 else []
+            operator.controller.cycle(operator.now, commands)
+            velocities.append(float(operator.arm.velocities[0]))
+        assert operator.state.scale == scale
+        assert velocities[-1] == pytest.approx(expected, abs=1e-6)
+    limits = operator.controller.motion.trajectory.limits.ordinary
+    acceleration = np.diff(velocities) / DT
+    assert np.abs(acceleration).max() <= limits.acceleration[0] * 1.001
+    assert np.abs(np.diff(acceleration) / DT).max() <= limits.jerk[0] * 1.001
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        TurnJoint(joint=1, angle=1.5),
+        Pose(name="tray"),
+        JogCartesian(linear=(0.0, 0.0, 0.2)),
+        JogCartesian(angular=(0.0, 0.0, 0.5), frame="tool"),
+    ],
+    ids=lambda action: action.type,
 )
-TestAnyOrder = pytest.mark.timeout(300)(AnyOrder.TestCase)
+def test_a_change_of_the_scale_in_any_motion_keeps_the_limits(action: Action) -> None:
+    operator = Operator().ready()
+    limits = operator.controller.motion.trajectory.limits
+    tops, velocities = [], []
+    for scale, seconds in [(1.0, 0.3), (0.1, 0.3), (0.1, 0.2), (0.5, 0.2)]:
+        part = []
+        for count in range(round(seconds / DT)):
+            operator.now += DT
+            commands = [operator.command(action, 1, scale=scale)] if count % 8 == 0 else []
+            operator.controller.cycle(operator.now, commands)
+            part.append(operator.controller.motion.trajectory.velocity.copy())
+        tops.append(float((np.abs(part) / limits.ordinary.velocity).max()))
+        velocities += part
+    assert tops[2] <= 0.1 + 1e-6
+    assert min(tops[0], tops[3]) > 1.5 * tops[2]
+    acceleration = np.diff(velocities, axis=0) / DT
+    assert (np.abs(acceleration) <= limits.ordinary.acceleration * 1.01).all()
+    assert (np.abs(np.diff(acceleration, axis=0) / DT) <= limits.stop.jerk * 1.01).all()
+
+
+def test_the_states_tell_the_newest_steps() -> None:
+    operator = Operator().ready()
+    operator.show(JOG, 1, 0.4)
+    doubted(operator, "two_hands")
+    steps = operator.state.transitions
+    assert [step.number for step in steps] == list(range(1, len(steps) + 1))
+    assert (steps[-1].before, steps[-1].after, steps[-1].stop) == ("armed", "holding", "S2")
+    assert steps[-1].reason == DOUBTS["two_hands"]
+    assert 0 <= tick_of(operator.now) - steps[-1].tick <= 110
+    assert State.model_validate_json(operator.state.encode()).transitions == steps
+
+
+def test_things_go_back_only_while_the_arm_is_disarmed_or_stopped_and_stands() -> None:
+    operator = Operator().ready()
+    assert operator.ask("reset_scene", holder="anybody").code == "armed"
+    operator.show(JOG, 1, 0.4)
+    operator.ask("disarm")
+    assert operator.ask("reset_scene").code == "moving"
+    operator.wait(0.4)
+    assert operator.arm.scene_resets == 0
+    assert operator.ask("reset_scene", holder="anybody").granted
+    operator.controller.stop(StopRequest(source="page", reason="button"))
+    operator.wait(0.1)
+    assert operator.ask("reset_scene").granted
+    assert operator.arm.scene_resets == 2
+    assert operator.state.mode == "stopped"

@@ -33,3 +33,15 @@ def test_a_long_delay_is_let_go() -> None:
 
 def test_before_the_first_cycles_there_is_nothing_to_say() -> None:
     assert LoopClock(0.005).state().rate_hz == 0.0
+
+
+def test_cycles_that_begin_late_or_never_are_counted() -> None:
+    clock = LoopClock(0.005)
+    clock.wait()
+    clock.wait()
+    before = clock.state()
+    time.sleep(0.2)  # so far behind that the loop lets these cycles go
+    clock.wait()
+    after = clock.state()
+    assert after.late - before.late >= 30
+    assert after.cycles - before.cycles >= after.late - before.late

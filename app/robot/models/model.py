@@ -16,6 +16,7 @@ from app.link.messages import (
     Description,
     JointDescription,
     ObjectDescription,
+    WorkspaceDescription,
 )
 
 Vector3 = tuple[float, float, float]
@@ -122,6 +123,10 @@ class Model(_Part):
         "joined; neighbours in the chain are always left out",
     )
 
+    link_words: dict[str, str] = Field(
+        default={}, description="links in plain words, such as forearm, for messages to people"
+    )
+
     @model_validator(mode="after")
     def _poses_fit(self) -> Self:
         for name, pose in self.poses.items():
@@ -168,7 +173,11 @@ class Model(_Part):
                 for joint in self.joints
             ),
             poses=self.poses,
+            workspace=None
+            if self.workspace is None
+            else WorkspaceDescription(lower=self.workspace.lower, upper=self.workspace.upper),
             gripper_max=self.gripper.width,
+            gripper_force=self.gripper.force,
             cameras=tuple(
                 CameraDescription(
                     name=camera.name,

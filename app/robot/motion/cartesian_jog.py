@@ -12,6 +12,10 @@ experiments on an industrial robot manipulator", IEEE Trans. Control Systems Tec
 Nakamura and Hanafusa 1986.) Where a joint would pass its limit, ``s`` falls for all joints alike,
 so that the tool stays on its line. ``s`` looks ahead: it is judged where the arm will be when it
 could have slowed down.
+
+A jog without a duration begins at a crawl (``ArmMotionSettings.creep``). From the moment a person
+sees the tool move, the hand's way down, the pipeline and the release take about 0.6 s: at full
+speed from the start nobody could move the tool by less than 6 cm (benchmarks/RESULTS.md).
 """
 
 import math
@@ -87,6 +91,8 @@ class CartesianJog:
             (f"the tool moves at {100 * part:.0f}% of the speed asked for",) if part < 1 else ()
         )
         self._left = action.duration
+        self._creeps_for = settings.creep_s if action.duration is None else 0.0
+        self._crawl_left = 0.0
         self._pace = 0.0
         self._pace_rate = 0.0
         self._ruckig = Ruckig(1, 1.0)
@@ -113,6 +119,10 @@ class CartesianJog:
         now, _ = self._solve(jacobian, self._wanted())
         ramp = self._ramp(now)
         target, reasons = (0.0, ()) if over else self._allowed(trajectory, now, ramp)
+        if self._crawl_left > 0:
+            self._crawl_left -= trajectory.dt
+            target = min(target, self._settings.creep)
+        target = min(target, trajectory.scale) * trajectory.slowed
         self._advance(target, ramp, trajectory.dt)
         self.limits = self._clipped + reasons
         if self._pace < 1e-6 and abs(self._pace_rate) < 1e-4 and target == 0.0:
@@ -152,6 +162,7 @@ class CartesianJog:
             angular = rotate(self._orientation, angular)
         self._twist = np.concatenate([linear, angular])
         self._pace = self._pace_rate = 0.0
+        self._crawl_left = self._creeps_for
         self._thrown_off = False
 
     def _wanted(self) -> Vector:

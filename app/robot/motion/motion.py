@@ -24,16 +24,20 @@ from app.robot.arm import Arm, Reading, Vector
 from app.robot.motion import sequence
 from app.robot.motion.ask_for_stop import AskForStop
 from app.robot.motion.cartesian_jog import CartesianJog
-from app.robot.motion.go_to import GoTo
+from app.robot.motion.go_to import GoClear, GoTo
 from app.robot.motion.grip import Grip
+from app.robot.motion.guard import Guard
 from app.robot.motion.joint_jog import JointJog
 from app.robot.motion.limits import Limits
-from app.robot.motion.task import Task
+from app.robot.motion.planner import Planner, Search
+from app.robot.motion.task import Refused, Task
 from app.robot.motion.trajectory import JointTrajectory
 from app.robot.motion.turn_joint import JointTurn
 
 _FINGERS_STILL = 0.002
 """m/s"""
+_PLANNED_EXTRA = 0.005
+"""m; planned ways keep so much farther off than the stop distances, so that nothing stops them."""
 
 
 class Motion:
@@ -54,11 +58,20 @@ class Motion:
         self._settings = settings
         limits = Limits.of(self._joints, settings)
         self.trajectory = JointTrajectory(limits, arm.read().joints, dt)
+        self.guard = Guard(
+            arm.proximity,
+            arm.kinematics,
+            arm.description.workspace,
+            settings.clearance,
+            len(self._joints),
+        )
         self.action: Action | None = None
         """What is being done, until the arm is at rest again."""
         self.wants_stop = False
         """A sequence has come to a stop: the caller is to stop the robot."""
         self._task: Task | None = None
+        self._refused: tuple[str, ...] = ()
+        """Why the last task did not go on, while its gesture is held."""
         self._braking_hard = False
         self._width: float | None = None
         self._finger_speed = 0.0
@@ -76,7 +89,9 @@ class Motion:
     @property
     def limits(self) -> tuple[str, ...]:
         """Limits at work, in plain words."""
-        return self._task.limits if self._task is not None else ()
+        if self._task is None:
+            return self._refused
+        return self._task.limits + self.guard.limits
 
     def refusal(self, action: Action | Step) -> str | None:
         """Why this arm cannot do ``action``, in plain words; None when it can."""
@@ -105,11 +120,13 @@ class Motion:
         if (reason := self.refusal(action)) is not None:
             raise ValueError(reason)
         self._task = self._task_of(action)
+        self._refused = ()
         self._braking_hard = False
         self.action = action
 
     def release(self) -> None:
         """The gesture was let go: come to rest at the ordinary pace."""
+        self._refused = ()
         if self._task is not None and not self._task.release():
             self._task = None
         self._keep_fingers()
@@ -117,6 +134,7 @@ class Motion:
     def halt(self) -> None:
         """A stop: come to rest at once, within 200 ms."""
         self._task = None
+        self._refused = ()
         if not self._braking_hard:
             self._braking_hard = True
             self._keep_fingers()
@@ -124,6 +142,7 @@ class Motion:
     def reset(self, joints: Vector) -> None:
         """Be at rest where the arm really is, at ``joints`` (rad, shape (n,))."""
         self._task = self.action = None
+        self._refused = ()
         self.wants_stop = False
         self._braking_hard = False
         self.trajectory.reset(joints)
@@ -133,14 +152,32 @@ class Motion:
         if self._width is not None:
             self._finger_speed = (reading.gripper - self._width) / self.trajectory.dt
         self._width = reading.gripper
+        trajectory = self.trajectory
+        self.guard.watch(reading, trajectory.position, standing=trajectory.at_rest)
         if self._task is not None:
-            if self._task.step(self.trajectory, reading):
-                self._task = None
+            self._go_on(self._task, reading)
         else:
             self.trajectory.brake(hard=self._braking_hard)
         if self._task is None and self.trajectory.at_rest:
             self.action = None
             self._braking_hard = False
+
+    def _go_on(self, task: Task, reading: Reading) -> None:
+        """One step of the task, if nothing is in its way."""
+        trajectory, guard = self.trajectory, self.guard
+        before = trajectory.now
+        trajectory.slowed = guard.scale
+        try:
+            if task.step(trajectory, reading):
+                self._task = None
+            moved = trajectory.position is not before.position
+            if guard.active and moved and not guard.allows(trajectory):
+                trajectory.become(before)
+                trajectory.brake()
+                raise Refused(*guard.limits)
+        except Refused as refused:
+            self._task = None
+            self._refused = (str(refused),)
 
     def _keep_fingers(self) -> None:
         """Fingers on their way stop where they are; fingers that hold something go on holding."""
@@ -159,9 +196,9 @@ class Motion:
             case TurnJoint():
                 return JointTurn(action, self._joints)
             case Pose():
-                return GoTo(np.array(self._arm.description.poses[action.name]))
+                return self._go_clear(self._arm.description.poses[action.name], action.name)
             case Home():
-                return GoTo(self._arm.home.copy())
+                return self._go_clear(self._arm.home, "home")
             case Gripper():
                 widest = self._arm.description.gripper_max
                 width = min(action.width, widest)
@@ -173,6 +210,20 @@ class Motion:
                 return AskForStop(self._ask_for_stop)
             case MoveLinear() | Wait() | Repeat():
                 raise ValueError(f"this arm cannot do {action.type} yet")
+
+    def _go_clear(self, target: tuple[float, ...] | Vector, name: str) -> Task:
+        joints = np.array(target, dtype=float)
+        if not self.guard.active:
+            return GoTo(joints)
+        return GoClear(joints, f"the pose {name}", self._search, self._settings.planning_s)
+
+    def _search(self, start: Vector, goal: Vector) -> Search:
+        guard, limits = self.guard, self.trajectory.limits
+
+        def room(joints: Vector) -> float:
+            return guard.room(guard.margins(joints), _PLANNED_EXTRA)
+
+        return Planner(limits.lower, limits.upper, guard.reach, room).search(start, goal)
 
     def _ask_for_stop(self) -> None:
         self.wants_stop = True

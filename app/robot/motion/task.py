@@ -6,10 +6,18 @@ from app.robot.arm import Reading
 from app.robot.motion.trajectory import JointTrajectory
 
 
+class Refused(Exception):
+    """A task cannot be done as things are; the message says why, in plain words.
+
+    Not an error of anybody: the arm comes to rest, and a sequence goes no further.
+    """
+
+
 class Task(Protocol):
     """One action being done. Begins with the arm at rest; ``step`` is called once a cycle.
 
-    A task that ends leaves the arm at rest. In a stop, it just stops being called.
+    ``trajectory.scale`` times ``trajectory.slowed`` is the part of its speed that it may use now. A
+    task that ends leaves the arm at rest. In a stop, it just stops being called.
     """
 
     limits: tuple[str, ...]
@@ -20,6 +28,9 @@ class Task(Protocol):
 
         Returns:
             Whether the task has ended.
+
+        Raises:
+            Refused: it cannot go on.
         """
         ...
 

@@ -7,9 +7,11 @@ States", RSS 2021), so that nothing ever jumps, whatever is asked.
 ruckig knows no position limits in velocity control. They are kept by an invariant: *braking now
 would end inside them*. Every step is first tried; a joint whose braking from there would end
 outside brakes now instead, along the very profile that was checked one step before.
+:mod:`app.robot.motion.guard` keeps the same invariant for distances and the tool's workspace.
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from ruckig import ControlInterface, InputParameter, Result, Ruckig, Synchronization, Trajectory
@@ -25,6 +27,17 @@ _EPSILON = 1e-7
 """rad; rounding of ruckig's profiles."""
 
 
+class Moment(NamedTuple):
+    """Where the joints are at one time, and how they move; shape (n,) each."""
+
+    position: Vector
+    """rad"""
+    velocity: Vector
+    """rad/s"""
+    acceleration: Vector
+    """rad/s^2"""
+
+
 class JointTrajectory:
     """Where the joints are commanded to be.
 
@@ -37,6 +50,11 @@ class JointTrajectory:
     def __init__(self, limits: Limits, joints: Vector, dt: float) -> None:
         self.limits = limits
         self.dt = dt
+        self.scale = 1.0
+        """Part of the ordinary speed at which motion runs. May change at any time: the velocity
+        goes over to the new one within the ordinary acceleration and jerk."""
+        self.slowed = 1.0
+        """Part of that which is left near things; may change in the same way."""
         count = len(joints)
         self.position: Vector = np.zeros(count)
         self.velocity: Vector = np.zeros(count)
@@ -66,6 +84,11 @@ class JointTrajectory:
         )
 
     @property
+    def now(self) -> Moment:
+        """The present moment."""
+        return Moment(self.position, self.velocity, self.acceleration)
+
+    @property
     def held_back(self) -> Vector:
         """Per joint: 1 or -1 while it stops short of its upper or lower limit, else 0."""
         return self._held_back
@@ -73,7 +96,7 @@ class JointTrajectory:
     def follow_velocity(self, wanted: Vector) -> None:
         """One step towards the joint velocities ``wanted`` (rad/s, shape (n,)), each on its own.
 
-        Velocities above the ordinary pace are clipped; a joint near its limit brakes.
+        Velocities above the ordinary pace are clipped, then scaled; a joint near its limit brakes.
 
         Raises:
             ValueError: ``wanted`` is not finite.
@@ -81,7 +104,7 @@ class JointTrajectory:
         if not np.isfinite(wanted).all():
             raise ValueError(f"joint velocities must be finite, not {wanted}")
         pace = self.limits.ordinary
-        wanted = np.clip(wanted, -pace.velocity, pace.velocity)
+        wanted = self.scale * self.slowed * np.clip(wanted, -pace.velocity, pace.velocity)
         # Once a joint brakes for its limit it does so to the end, lest it should dither there.
         self._held_back[np.sign(wanted) != self._held_back] = 0.0
         wanted = np.where(self._held_back != 0.0, 0.0, wanted)
@@ -103,34 +126,29 @@ class JointTrajectory:
         self._solve(self._profile, np.zeros_like(self.position), pace)
         self._become(*map(np.array, self._profile.at_time(self.dt)))
 
-    def follow_target(self, target: Vector) -> bool:
-        """One step towards standing at ``target`` (rad, shape (n,)); all joints arrive together.
-
-        Returns:
-            Whether it is reached.
+    def become(self, moment: Moment) -> None:
+        """Be at ``moment`` after this step: the caller answers for every limit.
 
         Raises:
-            ValueError: ``target`` is not finite, or outside the limits.
+            ValueError: it is not finite.
         """
-        if not np.isfinite(target).all():
-            raise ValueError(f"joint targets must be finite, not {target}")
-        if (target < self.limits.lower).any() or (target > self.limits.upper).any():
-            raise ValueError(f"joint targets {target} are outside the limits")
-        self._held_back[:] = 0.0
-        pace = self.limits.ordinary
-        given = self._state_input(pace)
-        given.control_interface = ControlInterface.Position
-        given.synchronization = Synchronization.Time
-        given.max_velocity = pace.velocity.tolist()
-        given.target_position = target.tolist()
-        given.target_velocity = [0.0] * len(target)
-        _checked(self._ruckig.calculate(given, self._profile))
-        if self._profile.duration <= self.dt:
-            self.position = target.copy()
-            self._rest()
-            return True
-        self._become(*map(np.array, self._profile.at_time(self.dt)))
-        return False
+        if not all(np.isfinite(part).all() for part in moment):
+            raise ValueError(f"a moment must be finite, not {moment}")
+        self._held_back = np.zeros_like(self.position)
+        self._become(*moment)
+
+    def braking(self, *, hard: bool = False) -> Trajectory:
+        """The profile that :meth:`brake` would follow from now on.
+
+        ``position_extrema``, ``duration`` and ``at_time`` tell of it. Valid until the next call of
+        any method of this trajectory.
+        """
+        self._solve(
+            self._braking,
+            np.zeros_like(self.position),
+            self.limits.stop if hard else self.limits.ordinary,
+        )
+        return self._braking
 
     def accept(self, position: Vector, velocity: Vector) -> bool:
         """Take ``position`` (rad) and ``velocity`` (rad/s) as the next step, if no limit forbids.

@@ -4,15 +4,17 @@ import numpy as np
 import pybullet
 
 from app.link.messages import ObjectState
-from app.robot.arm import Reading, Vector
+from app.robot.arm import Contact, Reading, Vector
 from app.robot.models import model_assets
 from app.robot.sim.kinematics import SerialKinematics
+from app.robot.sim.proximity import FLOOR, SimulatedProximity
 from app.robot.sim.world import (
     STEPS_PER_SECOND,
     add_floor,
     add_object,
     connect,
     load_robot,
+    upright,
 )
 
 _POSITION_GAIN = 0.3
@@ -22,6 +24,10 @@ _SOLVER_ITERATIONS = 120
 things slip; 120 leave no slip that can be measured. Most steps end early, by the residual."""
 _BRAKED_SPEED = 0.005
 """rad/s; slower than this, a braking joint counts as standing and is locked where it is."""
+_TOUCH = 0.5
+"""N; what presses on a finger with less is not held."""
+_LOST_STEPS = 24
+"""0.1 s; a held thing that was not touched by both fingers for so long is held no more."""
 
 
 class SimulatedArm:
@@ -62,6 +68,8 @@ class SimulatedArm:
             physicsClientId=self.client,
         )
         self.body, joints, self._links = load_robot(self.client, assets.urdf_path)
+        self._link_names = {index: name for name, index in self._links.items()}
+        self.proximity = SimulatedProximity(assets, objects=objects)
         self._joints = [joints[joint.name] for joint in self.model.joints]
         self._fingers = [joints[name] for name in self.model.gripper.fingers]
         self._measured = self._joints + self._fingers
@@ -75,11 +83,15 @@ class SimulatedArm:
         self._couple_fingers()
         self.objects: dict[str, int] = {}
         self._moving: list[tuple[str, int]] = []
+        self._thing_names: dict[int, str] = {}
+        self._held: str | None = None
+        self._lost = 0
         if objects:
-            add_floor(self.client)
+            self._thing_names[add_floor(self.client)] = FLOOR
             for thing in self.model.objects:
                 body = add_object(self.client, thing)
                 self.objects[thing.name] = body
+                self._thing_names[body] = thing.name
                 if thing.mass > 0:
                     self._moving.append((thing.name, body))
         self.move(self.home, np.zeros(len(self._joints)))
@@ -93,12 +105,15 @@ class SimulatedArm:
         states = pybullet.getJointStates(self.body, self._measured, physicsClientId=self.client)
         count = len(self._joints)
         joints = np.array([state[0] for state in states[:count]])
+        contacts = self._contacts()
         return Reading(
             joints=joints,
             velocities=np.array([state[1] for state in states[:count]]),
             gripper=max(0.0, sum(state[0] for state in states[count:])),
             tool=self.kinematics.forward(joints),
             objects=tuple(self._object(name, body) for name, body in self._moving),
+            contacts=contacts,
+            held=self._held,
         )
 
     def move(self, joints: Vector, velocities: Vector) -> None:
@@ -156,6 +171,20 @@ class SimulatedArm:
             self._braked = False
             self.move(self._angles()[0], np.zeros(len(self._joints)))
 
+    def reset_scene(self) -> None:
+        """Put every thing that can move back where it was at first, at rest."""
+        places = {thing.name: thing for thing in self.model.objects}
+        for name, body in self._moving:
+            pybullet.resetBasePositionAndOrientation(
+                body,
+                places[name].position,
+                upright(places[name].turn),
+                physicsClientId=self.client,
+            )
+            pybullet.resetBaseVelocity(
+                body, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), physicsClientId=self.client
+            )
+
     def step(self) -> None:
         """Let 1/240 s pass."""
         pybullet.stepSimulation(physicsClientId=self.client)
@@ -168,6 +197,7 @@ class SimulatedArm:
         """Give the Bullet world back. Closing twice does no harm."""
         if self._open:
             self._open = False
+            self.proximity.close()
             pybullet.disconnect(self.client)
 
     def _angles(self) -> tuple[Vector, Vector]:
@@ -230,6 +260,36 @@ class SimulatedArm:
             maxForce=2 * self.model.gripper.force,
             physicsClientId=self.client,
         )
+
+    def _contacts(self) -> tuple[Contact, ...]:
+        """What the arm presses on, as felt in the last step."""
+        forces: dict[tuple[int, int], float] = {}
+        for point in pybullet.getContactPoints(self.body, physicsClientId=self.client):
+            # The arm is body A of its contacts with others, A and B of those with itself.
+            if point[2] != self.body and point[9] > 0:
+                pair = point[3], point[2]
+                forces[pair] = forces.get(pair, 0.0) + point[9]
+        movable = {body for _, body in self._moving}
+        self._find_held(forces)
+        return tuple(
+            Contact(
+                self._link_names[link],
+                self._thing_names.get(body, "unknown_thing"),
+                force,
+                link in self._fingers and body in movable,
+            )
+            for (link, body), force in forces.items()
+        )
+
+    def _find_held(self, forces: dict[tuple[int, int], float]) -> None:
+        """A thing that presses on both fingers is held, until it was lost for a while."""
+        for name, body in self._moving:
+            if all(forces.get((finger, body), 0.0) > _TOUCH for finger in self._fingers):
+                self._held, self._lost = name, 0
+                return
+        self._lost += 1
+        if self._lost >= _LOST_STEPS:
+            self._held = None
 
     def _object(self, name: str, body: int) -> ObjectState:
         position, (x, y, z, w) = pybullet.getBasePositionAndOrientation(

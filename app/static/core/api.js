@@ -49,6 +49,8 @@ export const api = Object.freeze({
     robot: (robot) => request("GET", `api/robots/${id(robot)}`),
     stopRobot: (robot, timeoutMs) =>
         request("POST", `api/robots/${id(robot)}/stop`, { timeoutMs }),
+    /** Put every movable thing back. */
+    resetScene: (robot) => request("POST", `api/robots/${id(robot)}/scene/reset`),
     resetRobot: (robot) => request("POST", `api/robots/${id(robot)}/reset`),
     /** When which gesture is shown by the synthetic operator: [{start_s, end_s, gesture}]. */
     operatorCaptions: () => request("GET", "static/media/operator.json"),

@@ -20,6 +20,8 @@ export const INITIAL_STATE = Object.freeze({
     sender: { rate: 0, latencyMs: null, width: 0, height: 0 },
     clipGesture: undefined, // gesture that the synthetic operator shows; undefined: not known
     stopping: "idle",
+    speed: 1, // part of the ordinary speed
+    fine: false,
 });
 
 /** Changes of the store for `message`; null for messages that change nothing in it. */

@@ -9,6 +9,8 @@ export const CLIENT_MESSAGES = Object.freeze([
     "stop",
     "reset",
     "view",
+    "speed",
+    "picture",
     "ping",
 ]);
 

@@ -88,6 +88,23 @@ export const texts = Object.freeze({
             `${name} drives now. If you take over, the arm stops first and has to be armed again.`,
     },
 
+    speed: {
+        label: "Speed",
+        fine: "Fine",
+        fineHint: "A fifth of the ordinary speed (F)",
+    },
+
+    resetScene: {
+        button: "Put things back",
+        when: "While the robot is disarmed or stopped",
+        title: "Put things back?",
+        words:
+            "Every thing that can be moved jumps back to where it was at first, also out of the " +
+            "gripper. The arm does not move.",
+        yes: "Put them back",
+        done: "Everything is back in its place.",
+    },
+
     sentence: {
         connecting: "Connecting to the server…",
         gone: "The connection is lost. The robot stops by itself; trying to reach the server.",
@@ -107,6 +124,15 @@ export const texts = Object.freeze({
         disarmedWhy: (why) => `Disarmed: ${why}. Arm to go on.`,
         holding: (why) => (why ? `Holding still: ${why}.` : "Holding still."),
         holdingNext: "Show no gesture for half a second, then show it again.",
+        // Why it holds, when what you show or see cannot be trusted.
+        doubts: {
+            no_hand: "your hand is not in the picture",
+            unknown_hand: "your hand shows no gesture that it knows",
+            two_hands: "there are two hands in the picture, and it obeys one",
+            low_margin: "your hand is between two gestures, and it does not guess",
+            frozen: "your webcam sends the same picture over and over; turn it off and on again",
+            stale_picture: "the picture of the robot that you see is old",
+        },
         noFrames: "No pictures reach the server. Is the camera covered or the page hidden?",
         waitingPicture: "Waiting for the first pictures…",
         ready: "Ready. Show a gesture.",
@@ -222,6 +248,10 @@ export const texts = Object.freeze({
         tool: "Tool",
         toolValue: (x, y, z) => `x ${x}  y ${y}  z ${z} cm`,
         nothing: "at rest",
+        nearest: "Nearest",
+        nearestValue: (distance, thing, link) => `${distance} mm, ${thing} to ${link}`,
+        itself: (link) => `the arm's own ${link}`,
+        limits: "Limits",
     },
 
     action: {
@@ -377,6 +407,7 @@ export const texts = Object.freeze({
             ["Esc", "Stop"],
             ["A", "Arm or disarm"],
             ["C", "Take or release control"],
+            ["F", "Fine: a fifth of the speed"],
             ["W", "Swap wrist and scene"],
             ["?", "This help"],
         ],

@@ -72,7 +72,8 @@ export function want(element, what, detail = {}) {
 /** Whether keys belong to this element: somebody types in it or chooses with it. */
 export function isField(element) {
     // Not `instanceof`: the 3D view's frame has an Element class of its own.
-    const fields = "input, textarea, select, [contenteditable]";
+    // A slider takes no letters and no Space: both go on meaning what they mean elsewhere.
+    const fields = "input:not([type=range]), textarea, select, [contenteditable]";
     return Boolean(element && element.closest && element.closest(fields));
 }
 

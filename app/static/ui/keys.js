@@ -2,7 +2,7 @@
 
 import { isField, want } from "./dom.js";
 
-const LETTERS = { a: "toggle-arm", c: "toggle-control", w: "swap", "?": "help" };
+const LETTERS = { a: "toggle-arm", c: "toggle-control", f: "toggle-fine", w: "swap", "?": "help" };
 
 /**
  * Space and Escape stop, whatever has the focus, unless somebody types in a field (Escape then

@@ -1,7 +1,7 @@
 // The arm in figures: joints with their limits, gripper, tool, what is being done.
 
 import { texts } from "../texts/en.js";
-import { el, part, setText } from "./dom.js";
+import { button, el, part, setText, want } from "./dom.js";
 import { angle, degrees, describeAction, number, short } from "./words.js";
 
 const words = texts.readout;
@@ -36,6 +36,14 @@ export function readout(element, store) {
     const doing = part(element, "doing");
     const gripper = fact("gripper", words.gripper);
     const tool = fact("tool", words.tool);
+    const nearest = fact("nearest", words.nearest);
+    const active = fact("limits", words.limits);
+    const putBack = button(texts.resetScene.button, {
+        id: "btn-reset-scene",
+        title: texts.resetScene.when,
+        onclick: () => want(element, "reset-scene"),
+    });
+    part(element, "tools").append(putBack);
     let rows = [];
     let drawnAt = 0;
     let timer = 0;
@@ -69,6 +77,16 @@ export function readout(element, store) {
         if (Array.isArray(position)) {
             setText(tool, words.toolValue(...position.map((metres) => short(metres * 100, 0))));
         }
+        const near = robot && robot.clearance;
+        nearest.parentElement.hidden = !near;
+        if (near) {
+            const thing = near.itself ? words.itself(near.thing) : near.thing;
+            setText(nearest, words.nearestValue(number(near.distance * 1000, 0), thing, near.link));
+        }
+        const limited = (robot && robot.limits) || [];
+        active.parentElement.hidden = !limited.length;
+        setText(active, limited.join(", "));
+        putBack.disabled = !robot || !robot.online || robot.armed || robot.mode === "faulted";
     }
 
     store.watch(["robot", "description"], () => {

@@ -74,6 +74,9 @@ export function sentenceFor(state, now) {
         const gesture = seen(state);
         return gesture ? words.seenIdle(gesture, words.disarmed) : words.disarmed;
     }
+    if (mode === "holding" && words.doubts[robot.doubt]) {
+        return `${words.holding(words.doubts[robot.doubt])} ${words.holdingNext}`;
+    }
     if (mode === "holding") {
         // Some reasons say themselves how to go on.
         const next = /gesture/.test(why) ? "" : ` ${words.holdingNext}`;

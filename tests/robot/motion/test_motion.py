@@ -15,58 +15,8 @@ from app.link.actions import (
     Stop,
     TurnJoint,
 )
-from app.robot.motion.motion import Motion
 from tests.robot.fakes import DT, FakeArm
-
-
-class Rig:
-    """A motion with a fake arm; every step is checked against every limit."""
-
-    def __init__(self, joints: np.ndarray | None = None) -> None:
-        self.arm = FakeArm(joints)
-        self.motion = Motion(self.arm, ArmMotionSettings(), DT)
-        self.track: list[np.ndarray] = [self.arm.joints.copy()]
-        self.limits: set[str] = set()
-
-    def step(self) -> None:
-        motion, trajectory = self.motion, self.motion.trajectory
-        before = (trajectory.position, trajectory.velocity, trajectory.acceleration)
-        motion.step(self.arm.read())
-        self.arm.move(trajectory.position, trajectory.velocity)
-        self.arm.step()
-        self.track.append(trajectory.position.copy())
-        self.limits |= set(motion.limits)
-        bounds, most = trajectory.limits, trajectory.limits.stop
-        position, velocity, acceleration = before
-        assert (trajectory.position <= bounds.upper + 1e-6).all()
-        assert (trajectory.position >= bounds.lower - 1e-6).all()
-        assert (np.abs(trajectory.velocity) <= most.velocity + 1e-6).all()
-        assert (np.abs(trajectory.acceleration) <= most.acceleration + 1e-6).all()
-        jerk = np.abs(trajectory.acceleration - acceleration) / DT
-        assert (jerk <= most.jerk * 1.001).all()
-        # What is commanded is one smooth curve: position and velocity tell the same story.
-        middle = (trajectory.velocity + velocity) / 2 * DT
-        assert (
-            np.abs(trajectory.position - position - middle) <= most.acceleration * DT**2 / 2 + 1e-9
-        ).all()
-
-    def run(self, seconds: float) -> None:
-        for _ in range(round(seconds / DT)):
-            self.step()
-
-    def finish(self, within: float = 12.0) -> float:
-        """Step until the action has ended; s that it took."""
-        for count in range(round(within / DT)):
-            if not self.motion.busy:
-                return count * DT
-            self.step()
-        raise AssertionError("did not come to rest")
-
-    def do(self, action: Action, seconds: float) -> None:
-        self.motion.begin(action)
-        self.run(seconds)
-        self.motion.release()
-        self.finish()
+from tests.robot.motion.rig import Rig
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -77,7 +27,7 @@ def test_straight_lines_are_straight_and_as_fast_as_asked(axis: int, speed: floa
     linear = [0.0, 0.0, 0.0]
     linear[axis] = speed
     rig.motion.begin(JogCartesian(linear=tuple(linear)))
-    rig.run(0.5)
+    rig.run(1.0)
     before = rig.arm.read().tool.position
     rig.run(0.5)
     now = rig.arm.read().tool
@@ -92,6 +42,19 @@ def test_straight_lines_are_straight_and_as_fast_as_asked(axis: int, speed: floa
         assert abs(abs(tool.orientation @ start.orientation) - 1) < 1e-6
 
 
+def test_a_held_jog_begins_at_a_crawl_and_one_with_a_duration_does_not() -> None:
+    def way(action: JogCartesian) -> float:
+        rig = Rig()
+        start = rig.arm.read().tool.position
+        rig.do(action, 0.5)
+        return float(np.linalg.norm(rig.arm.read().tool.position - start))
+
+    settings = ArmMotionSettings()
+    held = way(JogCartesian(linear=(0.0, 0.1, 0.0)))
+    assert held == pytest.approx(0.5 * 0.1 * settings.creep, rel=0.1)
+    assert way(JogCartesian(linear=(0.0, 0.1, 0.0), duration=0.5)) == pytest.approx(0.05, rel=0.1)
+
+
 def test_turning_about_the_tool_keeps_its_point() -> None:
     rig = Rig()
     start = rig.arm.read().tool.position
@@ -103,7 +66,7 @@ def test_turning_about_the_tool_keeps_its_point() -> None:
 def test_the_tool_frame_is_the_tools() -> None:
     rig = Rig()
     start = rig.arm.read().tool.position
-    rig.do(JogCartesian(frame="tool", linear=(0.0, 0.0, 0.1)), 0.5)  # points down at home
+    rig.do(JogCartesian(frame="tool", linear=(0.0, 0.0, 0.1)), 1.0)  # points down at home
     moved = rig.arm.read().tool.position - start
     assert moved[2] < -0.04
     assert np.abs(moved[:2]).max() < 1e-3
@@ -126,7 +89,7 @@ def test_a_line_out_of_reach_slows_down_and_stops() -> None:
 
 
 def test_a_jog_into_a_limit_stops_there_and_leaves_it_again() -> None:
-    rig = Rig()
+    rig = Rig(FakeArm(bounded=False))
     rig.do(JogJoint(joint=3, velocity=4.0), 4.0)
     upper = rig.arm.description.joints[2].upper
     assert upper - 0.05 < rig.arm.joints[2] <= upper

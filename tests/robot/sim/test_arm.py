@@ -205,3 +205,15 @@ def test_pybullet_without_numpy_is_refused(monkeypatch: pytest.MonkeyPatch) -> N
 def test_an_unknown_model_is_named() -> None:
     with pytest.raises(CannotStart, match="no robot model 'r2d2'; there are: puma560"):
         SimulatedArm("r2d2")
+
+
+def test_things_go_back_to_where_they_began_and_lie_still(driver: Driver) -> None:
+    arm = driver.arm
+    before = {thing.name: thing for thing in arm.read().objects}
+    grasp(driver, "red_cube")
+    assert position_of(arm, "red_cube")[2] > before["red_cube"].position[2] + 0.05
+    arm.reset_scene()
+    driver.wait(0.5)
+    for thing in arm.read().objects:
+        assert thing.position == pytest.approx(before[thing.name].position, abs=0.003)
+        assert np.abs(np.dot(thing.orientation, before[thing.name].orientation)) > 0.999

@@ -1,0 +1,18 @@
+"""A real browser is stopped, or killed, while it drives: benchmarks/standstill.py, once each."""
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks.observer import STANDSTILL_MS
+from benchmarks.standstill import scenario
+
+pytestmark = [pytest.mark.e2e, pytest.mark.timeout(300)]
+
+
+@pytest.mark.parametrize("name", ["browser killed", "browser stopped"])
+def test_the_arm_stands_and_does_not_move_again(name: str, tmp_path: Path, chromium: str) -> None:
+    with scenario(name, tmp_path) as once:
+        outcome = once()
+    assert outcome.standstill.since_command_ms <= 2 * STANDSTILL_MS
+    assert not outcome.moved_again
