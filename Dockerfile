@@ -1,6 +1,6 @@
 # The headless server: gateway, robot node and camera process in one container.
 #   docker build -t farhand . && docker run -p 127.0.0.1:8000:8000 -v farhand:/data farhand
-# Then put a TLS proxy in front of it, or see README for certificates of your own.
+# Then put a TLS proxy in front of it; docs/deploy.md has that, and a container without a proxy.
 FROM python:3.11-slim-bookworm AS build
 WORKDIR /src
 # pybullet, simplejpeg and the rest come as wheels on x86-64; a compiler is not needed.
@@ -17,7 +17,8 @@ FROM python:3.11-slim-bookworm
 RUN useradd --system --uid 10001 --create-home farhand && install -d -o farhand /data
 COPY --from=build /opt/farhand /opt/farhand
 ENV PATH=/opt/farhand/bin:$PATH PYTHONUNBUFFERED=1 \
-    FARHAND_DATA_DIR=/data FARHAND_HOST=0.0.0.0 FARHAND_PORT=8000 FARHAND_BEHIND_PROXY=true
+    FARHAND_DATA_DIR=/data FARHAND_HOST=0.0.0.0 FARHAND_PORT=8000 FARHAND_BEHIND_PROXY=true \
+    FARHAND_PROXY_ADDRESSES='["127.0.0.0/8", "::1", "172.16.0.0/12", "192.168.0.0/16", "10.0.0.0/8"]'
 USER farhand
 WORKDIR /data
 VOLUME /data

@@ -15,6 +15,7 @@ import typer
 from pydantic import ValidationError
 
 from app.cli_gestures import draw_operator, draw_starter_set, enrol, gestures_app, settings_for
+from app.cli_tokens import tokens_app, trust
 from app.errors import FarhandError
 
 app = typer.Typer(
@@ -25,7 +26,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.add_typer(gestures_app, name="gestures")
+app.add_typer(tokens_app, name="token")
 app.command("enroll")(enrol)
+app.command("trust")(trust)
 gestures_app.command("draw")(draw_starter_set)
 gestures_app.command("draw-operator")(draw_operator)
 
@@ -46,6 +49,17 @@ def serve(
     tls_key: Annotated[Path | None, typer.Option(help="Private key (PEM).")] = None,
     behind_proxy: Annotated[
         bool | None, typer.Option(help="A proxy in front of this server does HTTPS.")
+    ] = None,
+    proxy_address: Annotated[
+        list[str] | None,
+        typer.Option(help="Address or network of that proxy; may be repeated. Default: loopback."),
+    ] = None,
+    root_path: Annotated[
+        str | None, typer.Option(help="Path below which that proxy shows this server.")
+    ] = None,
+    allowed_host: Annotated[
+        list[str] | None,
+        typer.Option(help="One more name by which browsers reach this server; may be repeated."),
     ] = None,
     robot_endpoint: Annotated[
         str | None,
@@ -69,7 +83,11 @@ def serve(
         "tls_cert": tls_cert,
         "tls_key": tls_key,
         "behind_proxy": behind_proxy,
+        "proxy_addresses": proxy_address or None,
+        "root_path": root_path,
     }
+    if allowed_host:
+        given["gateway"] = {"allowed_hosts": allowed_host}
     robot: dict[str, Any] = {}
     if robot_endpoint is not None:
         robot |= {"spawn": False, "endpoint": robot_endpoint}

@@ -6,10 +6,11 @@ Unknown keys are refused. Settings are passed in, never read at import.
 """
 
 import os
+from ipaddress import IPv4Network, IPv6Network
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, SecretStr, model_validator
+from pydantic import BaseModel, ConfigDict, Field, IPvAnyNetwork, SecretStr, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 
@@ -456,8 +457,9 @@ class GatewaySettings(_Section):
 
     allowed_hosts: tuple[str, ...] = Field(
         default=(),
-        description="host names that requests may be addressed to; on loopback its own names are "
-        "always allowed, elsewhere none given means any",
+        description="more host names that requests may be addressed to, and that the certificate "
+        "made here holds. On loopback and with that certificate the machine's own names are always "
+        "allowed; with a certificate of yours or behind a proxy none given means any",
     )
     max_message_bytes: int = Field(
         default=1 << 20,
@@ -557,7 +559,20 @@ class Settings(BaseSettings):
     tls_cert: Path | None = Field(default=None, description="certificate chain (PEM) for HTTPS")
     tls_key: Path | None = Field(default=None, description="private key (PEM) of the certificate")
     behind_proxy: bool = Field(
-        default=False, description="a proxy in front serves HTTPS; allows plain HTTP off loopback"
+        default=False,
+        description="a proxy in front serves HTTPS; allows plain HTTP off loopback, from "
+        "proxy_addresses alone",
+    )
+    proxy_addresses: tuple[IPvAnyNetwork, ...] = Field(
+        default=(IPv4Network("127.0.0.0/8"), IPv6Network("::1/128")),
+        min_length=1,
+        description="addresses or networks of the proxy in front; nobody else is answered, and "
+        "its X-Forwarded-For is believed",
+    )
+    root_path: str = Field(
+        default="",
+        pattern=r"^((/[A-Za-z0-9._~-]+)+)?$",
+        description="path below which a proxy shows this server, such as /farhand",
     )
     database_url: str | None = Field(
         default=None, description="SQLAlchemy URL; default: SQLite in the data folder"

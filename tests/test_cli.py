@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import zipfile
@@ -12,6 +13,8 @@ import httpx
 import numpy as np
 import pytest
 
+from app.gateway.machine import machine_names
+from app.gateway.tls import LocalAuthority
 from app.gestures.hand import POSES, HandLook, HandView, render_hand, render_sprite
 from app.gestures.hand.render import compose
 from app.gestures.synthetic import Step, SyntheticOperator, write_mjpeg
@@ -68,7 +71,12 @@ def test_what_is_wrong_is_told_in_one_line(tmp_path: Path, photo: Path) -> None:
         (("enroll", "stop", str(photo), "--action", '{"type":"home"}', *data), "stop"),
         (("enroll", "x", "nowhere.jpg", "--action", '{"type":"home"}', *data), "nowhere.jpg"),
         (("evaluate", str(tmp_path / "none")), "none"),
-        (("serve", "--host", "0.0.0.0", *data), "HTTPS"),
+        (("serve", "--tls-cert", "nowhere.pem", *data), "HTTPS"),
+        (("serve", "--root-path", "/arm", *data), "--behind-proxy"),
+        (("token", "make", "--role", "king", *data), "operator or observer"),
+        (("token", "make", "--role", "observer", "--expires", "1y", *data), "30d, 12h"),
+        (("token", "revoke", "nobody", *data), "there is no token"),
+        (("trust", *data), "there is no certificate authority"),
         (("serve", "--port", "99999", *data), "port"),
     ]
     for arguments, expected in cases:
@@ -131,6 +139,31 @@ def test_replay_prints_events_as_json_lines(tmp_path: Path) -> None:
     starts = [r["gesture"] for r in records if r["type"] == "gesture" and r["phase"] == "start"]
     assert starts == ["up"]
     assert any(r["reason"] for r in records if r["type"] == "frame")
+
+
+def test_tokens_are_made_listed_and_revoked(tmp_path: Path) -> None:
+    data = ("--data-dir", str(tmp_path / "data"))
+    options = ("--role", "observer", "--name", "Anna's tablet", "--expires", "12h")
+    made = json.loads(farhand("token", "make", *options, "--json", *data).stdout)
+    assert len(made["token"]) == 43
+    # No server has run here yet, so nobody knows its address.
+    assert made["link"] is None
+    (tmp_path / "data" / "address").write_text("https://arm.local:8000/\n")
+    said = farhand("token", "make", "--role", "operator", "--expires", "never", *data).stdout
+    assert re.search(r"^link:  https://arm\.local:8000/\?token=\S{43}$", said, re.MULTILINE)
+    listed = farhand("token", "list", *data).stdout
+    assert "Anna's tablet" in listed and "does not expire" in listed
+    assert made["token"] not in listed
+    assert "revoked" in farhand("token", "revoke", made["id"], *data).stdout
+    rows = json.loads(farhand("token", "list", "--json", *data).stdout)
+    assert [row["role"] for row in rows] == ["operator"]
+
+
+def test_the_fingerprint_of_the_authority_is_told(tmp_path: Path) -> None:
+    authority = LocalAuthority(tmp_path / "data" / "tls", machine_names)
+    authority.prepare()
+    said = farhand("trust", "--data-dir", str(tmp_path / "data")).stdout
+    assert said == f"SHA-256 {authority.public.fingerprint}\n{authority.public.pem.decode()}"
 
 
 def test_doctor_finds_nothing_wrong_here(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """The application: every route, behind one door."""
 
+import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -19,17 +20,23 @@ from app.gateway import (
     rest_programs,
     rest_robots,
     rest_server,
+    trust,
     viser_proxy,
 )
-from app.gateway.auth import Gatekeeper, load_token
+from app.gateway.auth import Gatekeeper, identity_of
 from app.gateway.errors import error_response, install_error_handlers
-from app.gateway.guard import Guard, signed_out_page
+from app.gateway.guard import Guard, signed_out_page, too_many_response
 from app.gateway.hub import Hub, package_version
+from app.gateway.messages import CLIENT_MESSAGES
 from app.gateway.operator_ws import operator_socket
+from app.gateway.roles import check_messages, check_routes
+from app.gateway.throttle import TooManyGuesses
+from app.gateway.tls import LocalAuthority
+from app.gateway.tokens import TokenStore
 
 STATIC = Path(__file__).parents[1] / "static"
 MAX_SIGN_IN = 4096
-WRONG_TOKEN = "That token is not the one of this server."
+WRONG_TOKEN = "That token is not one of this server's."
 
 pages = APIRouter(include_in_schema=False)
 
@@ -37,12 +44,11 @@ pages = APIRouter(include_in_schema=False)
 @pages.get("/")
 async def index(request: Request, token: str | None = None) -> Response:
     """The page; with ``?token=`` sign in first; without any sign-in ask for the token."""
-    gatekeeper: Gatekeeper = request.app.state.gatekeeper
     if token is not None:
         return _signed_in(request, token)
-    if gatekeeper.credential(request.headers) is None:
+    if identity_of(request.scope) is None:
         if "text/html" in request.headers.get("accept", ""):
-            return signed_out_page(request.headers, "/")
+            return signed_out_page(request.headers, request.app.state.settings.root_path, "/")
         return error_response(NotSignedIn("open the link that the server printed"))
     return FileResponse(STATIC / "index.html", headers={"Cache-Control": "no-cache"})
 
@@ -54,46 +60,73 @@ async def sign_in(request: Request) -> Response:
     async for part in request.stream():
         body += part
         if len(body) > MAX_SIGN_IN:
-            return signed_out_page(request.headers, "/", WRONG_TOKEN)
+            return _wrong(request)
     fields = parse_qs(body.decode("utf-8", "replace"))
     return _signed_in(request, fields.get("token", [""])[0].strip())
 
 
 def _signed_in(request: Request, token: str) -> Response:
     gatekeeper: Gatekeeper = request.app.state.gatekeeper
-    if gatekeeper.token_fits(token):
-        answer = RedirectResponse("/", 303)
-        answer.headers["Set-Cookie"] = gatekeeper.set_cookie_header()
-        return answer
+    try:
+        cookie = gatekeeper.sign_in(token, request.scope["farhand.client"])
+    except TooManyGuesses as error:
+        if "text/html" in request.headers.get("accept", ""):
+            return _wrong(request, f"{error.message}.", error.status)
+        return too_many_response(error)
+    if cookie is None:
+        return _wrong(request)
+    answer = RedirectResponse(f"{request.app.state.settings.root_path}/", 303)
+    answer.headers["Set-Cookie"] = cookie
+    return answer
+
+
+def _wrong(request: Request, problem: str = WRONG_TOKEN, status: int = 401) -> Response:
     if "text/html" in request.headers.get("accept", ""):
-        return signed_out_page(request.headers, "/", WRONG_TOKEN)
-    return error_response(NotSignedIn("this token is not the one of this server"))
+        prefix = request.app.state.settings.root_path
+        return signed_out_page(request.headers, prefix, "/", problem, status)
+    return error_response(NotSignedIn("this token is not one of this server's"))
 
 
 def create_app(
-    settings: Settings, *, token: str | None = None, is_ending: Callable[[], bool] = lambda: False
+    settings: Settings,
+    *,
+    token: str | None = None,
+    tokens: TokenStore | None = None,
+    authority: LocalAuthority | None = None,
+    is_ending: Callable[[], bool] = lambda: False,
 ) -> FastAPI:
     """The application; its lifespan opens and closes everything.
 
     Args:
         settings: Of the whole server.
-        token: The secret, where it was loaded already.
+        token: An operator's token in place of the settings' own.
+        tokens: The known tokens, where they were opened already.
+        authority: What made the certificate, if it was made here.
         is_ending: Asked while the start waits for the robot: whether to give up.
 
     Raises:
-        CannotStart: the page is not installed, or the token cannot be kept.
+        CannotStart: the page is not installed, the tokens cannot be read, or a route or message is
+            missing in the table of who may do what.
     """
     if not (STATIC / "index.html").is_file():
         raise CannotStart(
             f"the page is missing at {STATIC}; install Farhand anew", path=str(STATIC)
         )
-    gatekeeper = Gatekeeper.from_settings(settings, token or load_token(settings))
+    if tokens is None:
+        tokens = TokenStore.from_settings(settings, token)
+    certified = None if authority is None else (lambda: authority.names.hosts())
+    gatekeeper = Gatekeeper.from_settings(settings, tokens, certified)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         async with Hub.open(settings, is_ending) as hub:
             app.state.hub = hub
-            yield
+            watch = asyncio.create_task(gatekeeper.connections.watch())
+            try:
+                yield
+            finally:
+                watch.cancel()
+                await asyncio.gather(watch, return_exceptions=True)
 
     app = FastAPI(
         title="Farhand",
@@ -105,11 +138,13 @@ def create_app(
         redoc_url=None,
     )
     app.state.gatekeeper = gatekeeper
+    app.state.authority = authority
     app.state.settings = settings
     install_error_handlers(app)
-    app.add_middleware(Guard, gatekeeper=gatekeeper)
+    app.add_middleware(Guard, gatekeeper=gatekeeper, prefix=settings.root_path)
     for router in (
         pages,
+        trust.router,
         rest_gestures.router,
         rest_programs.router,
         rest_robots.router,
@@ -124,4 +159,6 @@ def create_app(
     # The video is compressed already, and browsers ask for parts of it.
     app.mount("/static/media", StaticFiles(directory=STATIC / "media"), name="media")
     app.mount("/static", GZipMiddleware(StaticFiles(directory=STATIC), 1024), name="static")
+    check_routes(app.routes)
+    check_messages(CLIENT_MESSAGES)
     return app

@@ -1,23 +1,27 @@
 """The door: every request and WebSocket passes here before anything else sees it."""
 
+import asyncio
+import contextlib
 import logging
 import time
 from http import HTTPStatus
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.responses import Response
+from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.errors import NotAllowed, NotSignedIn, RequestError
-from app.gateway.auth import Gatekeeper
-from app.gateway.errors import error_response, unexpected_response
+from app.errors import NotAllowed, NotFound, NotSignedIn, RequestError
+from app.gateway.auth import Gatekeeper, Identity
+from app.gateway.errors import error_body, error_response, unexpected_response
 from app.gateway.pages import again_page, sign_in_page
+from app.gateway.roles import WEBSOCKET, find
+from app.gateway.throttle import TooManyGuesses
 
 log = logging.getLogger(__name__)
 access_log = logging.getLogger("app.gateway.access")
 
-OPEN_PATHS = frozenset({"/", "/signin", "/api/health"})
-"""Reached without the secret; each of them decides itself what it shows."""
+CLOSE_REVOKED = 1008
+REVOKED = "the token of this connection opens nothing any more"
 
 PAGE_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
@@ -42,14 +46,21 @@ SECURITY_HEADERS = {
 
 
 class Guard:
-    """ASGI middleware: host, sign-in, origin, security headers, access log.
+    """ASGI middleware: prefix, host, sign-in, role, origin, security headers, access log.
 
-    The access log has the path without its query, where a token may stand.
+    The access log has the path without its query, where a token may stand. What is open on a token
+    ends when the token does.
+
+    Args:
+        app: What is behind the door.
+        gatekeeper: Who may come in.
+        prefix: The path below which a proxy shows this server; empty: none.
     """
 
-    def __init__(self, app: ASGIApp, gatekeeper: Gatekeeper) -> None:
+    def __init__(self, app: ASGIApp, gatekeeper: Gatekeeper, prefix: str = "") -> None:
         self._app = app
         self._gatekeeper = gatekeeper
+        self._prefix = prefix
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Admit or refuse."""
@@ -57,9 +68,9 @@ class Guard:
             await self._app(scope, receive, send)
             return
         started = time.monotonic()
-        path: str = scope["path"]
+        path, scope = self._below_prefix(scope)
         websocket = scope["type"] == "websocket"
-        method: str = "WEBSOCKET" if websocket else scope["method"]
+        method: str = WEBSOCKET if websocket else scope["method"]
         status = 0
 
         async def send_on(message: Message) -> None:
@@ -72,11 +83,11 @@ class Guard:
             await send(message)
 
         try:
-            headers = Headers(scope=scope)
-            refusal = self._refusal(headers, method, path, websocket=websocket)
+            refusal, identity = self._judge(scope, method, path)
+            scope["farhand.identity"] = identity
             if refusal is None:
                 try:
-                    await self._app(scope, receive, send_on)
+                    await self._pass(scope, receive, send_on, identity)
                 except Exception:
                     log.exception("%s %s failed", method, path[:200])
                     if status == 0 and not websocket:
@@ -96,32 +107,121 @@ class Guard:
                 (time.monotonic() - started) * 1e3,
             )
 
-    def _refusal(
-        self, headers: Headers, method: str, path: str, *, websocket: bool
-    ) -> Response | None:
+    def _below_prefix(self, scope: Scope) -> tuple[str, Scope]:
+        """The path below the prefix, and the scope in which the path has it.
+
+        Some proxies pass the prefix on, and some cut it off; both are understood.
+        """
+        path: str = scope["path"]
+        if not self._prefix:
+            return path, dict(scope)
+        if path.startswith(f"{self._prefix}/"):
+            path = path.removeprefix(self._prefix)
+        elif path == self._prefix:
+            return "", dict(scope)
+        return path, {**scope, "path": self._prefix + path, "root_path": self._prefix}
+
+    def _judge(
+        self, scope: Scope, method: str, path: str
+    ) -> tuple[Response | None, Identity | None]:
+        """Why a request is refused, or who sent it."""
+        if not path:
+            # What the page links to is relative: its own address has to end in a slash.
+            return RedirectResponse(f"{self._prefix}/", 308), None
+        headers = Headers(scope=scope)
+        websocket = method == WEBSOCKET
+        found = find(method, path)
         try:
+            client = self._gatekeeper.client(scope)
+            scope["farhand.client"] = client
             self._gatekeeper.check_host(headers)
-            if path in OPEN_PATHS and not websocket:
-                return None
-            self._gatekeeper.admit(headers, method, websocket=websocket)
+            if found.access == "anyone":
+                return None, self._gatekeeper.identify(headers, client)
+            identity = self._gatekeeper.admit(
+                headers,
+                method,
+                websocket=websocket,
+                access=found.access or "signed in",
+                client=client,
+            )
         except NotSignedIn as error:
             if not websocket and method == "GET" and "text/html" in headers.get("accept", ""):
-                return signed_out_page(headers, path)
-            return error_response(error, {"WWW-Authenticate": 'Bearer realm="farhand"'})
+                return signed_out_page(headers, self._prefix, path), None
+            return error_response(error, {"WWW-Authenticate": 'Bearer realm="farhand"'}), None
+        except TooManyGuesses as error:
+            return too_many_response(error), None
         except (NotAllowed, RequestError) as error:
-            return error_response(error)
-        return None
+            return error_response(error), None
+        return (None if found.access else _not_there(method, path, found.methods)), identity
+
+    async def _pass(
+        self, scope: Scope, receive: Receive, send: Send, identity: Identity | None
+    ) -> None:
+        """Let the application answer, as long as the token lives."""
+        if identity is None:
+            await self._app(scope, receive, send)
+            return
+        websocket = scope["type"] == "websocket"
+        begun = ended = False
+
+        async def send_on(message: Message) -> None:
+            nonlocal begun
+            begun = begun or message["type"] in ("http.response.start", "websocket.accept")
+            await send(message)
+
+        async def answer() -> None:
+            await self._app(scope, receive, send_on)
+
+        answering = asyncio.create_task(answer())
+
+        def end() -> None:
+            # What has not begun to answer is short, and may be half way through a change.
+            nonlocal ended
+            if begun and not ended:
+                ended = True
+                answering.cancel()
+
+        with self._gatekeeper.connections.kept(identity, end):
+            try:
+                await answering
+            except asyncio.CancelledError:
+                if not ended:
+                    raise
+        if not ended:
+            return
+        with contextlib.suppress(RuntimeError, OSError):
+            if websocket:
+                await send({"type": "websocket.close", "code": CLOSE_REVOKED, "reason": REVOKED})
+            else:
+                await send({"type": "http.response.body", "body": b"", "more_body": False})
 
 
-def signed_out_page(headers: Headers, path: str, problem: str | None = None) -> Response:
+def _not_there(method: str, path: str, methods: tuple[str, ...]) -> Response:
+    """What the table of routes does not have."""
+    if method == WEBSOCKET or not methods:
+        return error_response(NotFound(f"there is nothing at {path[:200]}"))
+    message = f"{method} is not possible at {path[:200]}"
+    return JSONResponse(
+        error_body("method_not_allowed", message), 405, {"Allow": ", ".join(methods)}
+    )
+
+
+def too_many_response(error: TooManyGuesses) -> Response:
+    """429, and when to come again."""
+    return error_response(error, {"Retry-After": str(error.detail.get("retry_after_s", 60))})
+
+
+def signed_out_page(
+    headers: Headers, prefix: str, path: str, problem: str | None = None, status: int = 401
+) -> Response:
     """What a signed-out browser sees.
 
     A link on another site's page brings no SameSite=Strict cookie even when there is one; one
     reload of our own page does. After that, or without the link, there is the token to ask for.
     """
     if headers.get("sec-fetch-site") == "cross-site" and problem is None:
-        return again_page(path)
-    return sign_in_page(problem)
+        return again_page(prefix + path)
+    return sign_in_page(problem, prefix=prefix, status=status)
 
 
 def _add_headers(message: Message, path: str) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from app.gateway.auth import identity_of
 from app.gateway.messages import encode
 from app.gateway.robot_view import robot_message
 from app.gateway.session import OperatorSession
@@ -28,7 +29,8 @@ async def operator_socket(socket: WebSocket) -> None:
     if len(hub.sessions) >= hub.settings.gateway.max_sessions:
         await socket.close(CLOSE_FULL, "too many sessions are open")
         return
-    session = OperatorSession(hub, socket)
+    identity = identity_of(socket.scope)
+    session = OperatorSession(hub, socket, identity.role if identity else "observer")
     # OSError: the connection broke while we were sending.
     with contextlib.suppress(WebSocketDisconnect, OSError):
         await session.run()

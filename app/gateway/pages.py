@@ -16,6 +16,9 @@ input, button { padding: .6rem; margin: .3rem 0 1rem; }
 button { cursor: pointer; }
 .problem { border-left: .3rem solid #c22; padding-left: .7rem; }
 code { font-family: ui-monospace, monospace; overflow-wrap: anywhere; }
+summary { cursor: pointer; font-weight: 600; padding: .4rem 0; }
+details { border-top: 1px solid #8886; }
+.print { font-size: 1.05rem; }
 td, th { text-align: left; vertical-align: top; padding: .3rem .8rem .3rem 0; }
 """
 _DIGEST = base64.b64encode(hashlib.sha256(_STYLE.encode()).digest()).decode()
@@ -25,7 +28,8 @@ _POLICY = (
 )
 
 
-def _page(title: str, body: str, *, status: int = 200, head: str = "") -> HTMLResponse:
+def page(title: str, body: str, *, status: int = 200, head: str = "") -> HTMLResponse:
+    """One page, without scripts; ``body`` and ``head`` are HTML."""
     html = (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
@@ -35,17 +39,20 @@ def _page(title: str, body: str, *, status: int = 200, head: str = "") -> HTMLRe
     return HTMLResponse(html, status_code=status, headers={"Content-Security-Policy": _POLICY})
 
 
-def sign_in_page(problem: str | None = None) -> HTMLResponse:
-    """A field for the token; status 401."""
+def sign_in_page(
+    problem: str | None = None, *, prefix: str = "", status: int = 401
+) -> HTMLResponse:
+    """A field for the token. ``prefix`` is the path below which a proxy shows this server."""
     told = f'<p class="problem" role="alert">{escape(problem)}</p>' if problem else ""
     body = (
         '<main class="narrow"><h1>Farhand</h1>'
         "<p>Open the link that the server printed when it started, or enter its token here.</p>"
-        f'{told}<form method="post" action="/signin"><label for="token">Token</label>'
+        f'{told}<form method="post" action="{prefix}/signin"><label for="token">Token</label>'
         '<input id="token" name="token" type="password" required autofocus autocomplete="off">'
-        "<button>Sign in</button></form></main>"
+        "<button>Sign in</button></form><p>Did the browser warn you of this page? "
+        f'<a href="{prefix}/trust">How to make it trust this server</a></p></main>'
     )
-    return _page("Farhand: sign in", body, status=401)
+    return page("Farhand: sign in", body, status=status)
 
 
 def again_page(path: str) -> HTMLResponse:
@@ -53,7 +60,7 @@ def again_page(path: str) -> HTMLResponse:
     target = escape(path, quote=True)
     head = f'<meta http-equiv="refresh" content="0;url={target}">'
     body = f'<main class="narrow"><p><a href="{target}">Go on to Farhand</a></p></main>'
-    return _page("Farhand", body, status=401, head=head)
+    return page("Farhand", body, status=401, head=head)
 
 
 def routes_page(openapi: dict[str, Any]) -> HTMLResponse:
@@ -68,9 +75,9 @@ def routes_page(openapi: dict[str, Any]) -> HTMLResponse:
             )
     body = (
         "<main><h1>Farhand: REST</h1><p>The whole description is in "
-        '<a href="/openapi.json">/openapi.json</a>. Errors have one shape: '
+        '<a href="openapi.json">openapi.json</a>. Errors have one shape: '
         "<code>{&quot;error&quot;: {&quot;code&quot;, &quot;message&quot;, &quot;detail&quot;}}"
         "</code>.</p><table><thead><tr><th>Method</th><th>Path</th><th></th><th>Answers</th></tr>"
         f"</thead><tbody>{''.join(rows)}</tbody></table></main>"
     )
-    return _page("Farhand: REST", body)
+    return page("Farhand: REST", body)

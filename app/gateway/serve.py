@@ -10,7 +10,7 @@ import signal
 import socket
 import ssl
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import Any
 
@@ -22,7 +22,13 @@ from fastapi import FastAPI
 from app.config import Settings
 from app.errors import CannotStart
 from app.gateway.app import create_app
-from app.gateway.auth import is_loopback, load_token
+from app.gateway.auth import is_loopback
+from app.gateway.front import SecureFront
+from app.gateway.greeting import greet
+from app.gateway.machine import machine_names
+from app.gateway.roles import ROUTES
+from app.gateway.tls import FOLDER, LocalAuthority
+from app.gateway.tokens import TokenStore
 
 log = logging.getLogger(__name__)
 
@@ -33,6 +39,7 @@ limit, so that a message over that is still read and the connection closed with 
 closing while the rest of it arrives would reset the connection and lose the code."""
 GRACE_S = 1
 UNSENT_BYTES = 128 * 1024
+CERTIFICATE_CHECK_S = 60.0
 
 LOG_CONFIG: dict[str, Any] = {
     "version": 1,
@@ -97,7 +104,7 @@ def bind(settings: Settings) -> socket.socket:
 
 
 def check_transport(settings: Settings) -> None:
-    """Refuse to serve plain HTTP to other machines, and half or broken certificates.
+    """Refuse half or broken certificates, and settings of a proxy without a proxy.
 
     Raises:
         CannotStart: with what to give instead.
@@ -105,14 +112,12 @@ def check_transport(settings: Settings) -> None:
     cert, key = settings.tls_cert, settings.tls_key
     if (cert is None) != (key is None):
         raise CannotStart("HTTPS needs both --tls-cert and --tls-key")
+    if settings.root_path and not settings.behind_proxy:
+        raise CannotStart("--root-path is for a server behind a proxy: give --behind-proxy, too")
+    first = settings.root_path.strip("/").partition("/")[0]
+    if first and any(path.split("/")[1] == first for path in (k.split(" ")[1] for k in ROUTES)):
+        raise CannotStart(f"--root-path may not begin with /{first}, which Farhand uses itself")
     if cert is None:
-        if not is_loopback(settings.host) and not settings.behind_proxy:
-            raise CannotStart(
-                f"{settings.host} is reached by other machines, and browsers allow no camera "
-                "without HTTPS: give --tls-cert and --tls-key, or --behind-proxy if a proxy in "
-                "front serves HTTPS, or listen on 127.0.0.1",
-                host=settings.host,
-            )
         return
     assert key is not None
     try:
@@ -123,15 +128,18 @@ def check_transport(settings: Settings) -> None:
         ) from error
 
 
-def link(settings: Settings, port: int, token: str) -> str:
-    """The address that signs a browser in."""
-    scheme = "http" if settings.tls_cert is None else "https"
-    host = settings.host
-    if host in ("0.0.0.0", "::", ""):
-        host = socket.gethostname() or "localhost"
-    if ":" in host:
-        host = f"[{host}]"
-    return f"{scheme}://{host}:{port}/?token={token}"
+def local_authority(settings: Settings) -> LocalAuthority | None:
+    """What makes the certificates of a server that other machines reach and that has none.
+
+    Raises:
+        CannotStart: its folder is open to others, or cannot be read or written.
+    """
+    if settings.tls_cert is not None or settings.behind_proxy or is_loopback(settings.host):
+        return None
+    more = (settings.host, *settings.gateway.allowed_hosts)
+    authority = LocalAuthority(settings.data_dir / FOLDER, lambda: machine_names(more))
+    authority.prepare()
+    return authority
 
 
 class Server(uvicorn.Server):
@@ -146,14 +154,39 @@ class Server(uvicorn.Server):
         """Leave the signals alone: :func:`serve` has them from before the start to the end."""
         yield
 
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Listen as uvicorn does; over HTTPS by a front that answers plain HTTP, too."""
+        context = self.config.ssl
+        if context is None or not sockets:
+            await super().startup(sockets)
+            return
+        await super().startup([])
+
+        def protocol() -> asyncio.Protocol:
+            # As uvicorn makes it for its own listeners.
+            made: asyncio.Protocol = self.config.http_protocol_class(  # type: ignore[call-arg]
+                config=self.config,
+                server_state=self.server_state,
+                app_state=self.lifespan.state,
+            )
+            return made
+
+        for listener in sockets:
+            self.servers.append(SecureFront(listener, context, protocol))  # type: ignore[arg-type]
+
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """End endless answers first, then as uvicorn does."""
         self._app.state.hub.closing.set()
         await super().shutdown(sockets)
 
 
-def make_server(app: FastAPI, settings: Settings) -> Server:
+def make_server(
+    app: FastAPI, settings: Settings, authority: LocalAuthority | None = None
+) -> Server:
     """A uvicorn server for ``app``, ready for ``serve(sockets=[...])``."""
+    # A file of the authority's holds both the certificate and its key.
+    cert = settings.tls_cert if authority is None else authority.server_file
+    key = settings.tls_key if authority is None else None
     config = uvicorn.Config(
         app,
         http="httptools",
@@ -169,10 +202,41 @@ def make_server(app: FastAPI, settings: Settings) -> Server:
         ws_ping_timeout=10.0,
         timeout_graceful_shutdown=GRACE_S,
         timeout_keep_alive=30,
-        ssl_certfile=settings.tls_cert,
-        ssl_keyfile=settings.tls_key,
+        ssl_certfile=cert,
+        ssl_keyfile=key,
     )
     return Server(config, app)
+
+
+async def keep_certificate(
+    context: ssl.SSLContext, settings: Settings, authority: LocalAuthority | None
+) -> None:
+    """Renew the certificate, or read again the one that was given, for ever.
+
+    Connections that are open keep theirs; new ones get the new one.
+    """
+    seen = _stamp(settings)
+    while True:
+        await asyncio.sleep(CERTIFICATE_CHECK_S)
+        try:
+            if authority is not None:
+                if await asyncio.to_thread(authority.prepare):
+                    context.load_cert_chain(authority.server_file)
+            elif settings.tls_cert is not None and (now := _stamp(settings)) != seen:
+                context.load_cert_chain(settings.tls_cert, settings.tls_key)
+                seen = now
+                log.info("read the certificate %s again", settings.tls_cert)
+        except (CannotStart, OSError, ssl.SSLError) as error:
+            log.error("the certificate stays as it is: %s", error)
+
+
+def _stamp(settings: Settings) -> tuple[int, ...]:
+    """Changes when the certificate that was given does."""
+    files = [path for path in (settings.tls_cert, settings.tls_key) if path is not None]
+    try:
+        return tuple(path.stat().st_mtime_ns for path in files)
+    except OSError:
+        return ()
 
 
 class Signals:
@@ -203,24 +267,38 @@ class Signals:
 
 
 async def _run(
-    app: FastAPI, settings: Settings, listener: socket.socket, told: str, signals: Signals
+    app: FastAPI,
+    settings: Settings,
+    authority: LocalAuthority | None,
+    listener: socket.socket,
+    told: Callable[[], None],
+    signals: Signals,
 ) -> None:
-    server = make_server(app, settings)
+    server = make_server(app, settings, authority)
     async with app.router.lifespan_context(app):
         if signals.ending:
             return
         signals.server = server
+        server.config.load()
+        keeping = None
+        if server.config.ssl is not None:
+            keeping = asyncio.create_task(keep_certificate(server.config.ssl, settings, authority))
         # What is loaded now stays: collections during the work need not look at it.
         gc.freeze()
-        sys.stdout.write(f"{told}\n")
-        sys.stdout.flush()
-        await server.serve(sockets=[listener])
+        told()
+        try:
+            await server.serve(sockets=[listener])
+        finally:
+            if keeping is not None:
+                keeping.cancel()
+                await asyncio.gather(keeping, return_exceptions=True)
 
 
 def serve(settings: Settings) -> None:
     """Run the server until it is asked to end by SIGINT or SIGTERM. Main thread only.
 
-    Prints one line on standard output once everything runs: the link that signs a browser in.
+    Prints one line on standard output once everything runs: the link that signs an operator in. On
+    a terminal also one for observers, codes for phones, and how to trust the certificate.
 
     Raises:
         CannotStart: the port, the data folder, the page or the certificate.
@@ -233,10 +311,17 @@ def serve(settings: Settings) -> None:
     signals = Signals()
     with bind(settings) as listener, signals.caught():
         port = int(listener.getsockname()[1])
-        token = load_token(settings)
-        app = create_app(settings, token=token, is_ending=lambda: signals.ending)
+        tokens = TokenStore.from_settings(settings)
+        authority = local_authority(settings)
+        app = create_app(
+            settings, tokens=tokens, authority=authority, is_ending=lambda: signals.ending
+        )
+
+        def tell() -> None:
+            greet(settings, port, tokens, authority)
+
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-            runner.run(_run(app, settings, listener, link(settings, port, token), signals))
+            runner.run(_run(app, settings, authority, listener, tell, signals))
     # The interpreter would look through every object of the 3D and imaging libraries several
     # times before it ends, for seconds on a busy machine; there is nothing left to find.
     gc.freeze()

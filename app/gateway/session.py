@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from app.errors import FarhandError, FrameRefused, RequestError
+from app.errors import FarhandError, FrameRefused, NotAllowed, RequestError
 from app.gateway.drive import Situation
 from app.gateway.errors import INTERNAL_MESSAGE
 from app.gateway.eyes import PictureAge
@@ -28,6 +28,7 @@ from app.gateway.messages import (
 from app.gateway.numbers import newer, tick_ms
 from app.gateway.outbox import Outbox
 from app.gateway.pace import Pace
+from app.gateway.roles import FRAME, OPERATORS_ONLY, Role, may_send
 from app.link.header import HEADER_SIZE, FrameHeader
 from app.pipeline.decode import read_header
 
@@ -75,8 +76,9 @@ class OperatorSession:
     asker puts requests to the robot one after another. The first to end ends the session.
     """
 
-    def __init__(self, hub: "Hub", socket: WebSocket) -> None:
-        self.name = f"operator-{secrets.token_hex(3)}"
+    def __init__(self, hub: "Hub", socket: WebSocket, role: Role = "operator") -> None:
+        self.name = f"{role}-{secrets.token_hex(3)}"
+        self._role: Role = role
         self.outbox = Outbox()
         self._hub = hub
         self._socket = socket
@@ -152,7 +154,7 @@ class OperatorSession:
         return {
             "type": "hello",
             "tick": self._opened_tick,
-            "role": "operator",
+            "role": self._role,
             "robot": self._hub.robot.id,
             "session": self.name,
             "version": self._hub.version,
@@ -201,6 +203,8 @@ class OperatorSession:
         """
         header = FrameHeader.unpack(message)
         seq = header.sequence
+        if not may_send(FRAME, self._role):
+            raise NotAllowed("an observer's frames are not looked at", seq=seq)
         jpeg = message[HEADER_SIZE:]
         try:
             self._check_frame(jpeg)
@@ -259,6 +263,9 @@ class OperatorSession:
 
     def _take_text(self, text: str) -> None:
         message = parse_client_message(text)
+        if not may_send(message.type, self._role):
+            self._tell(NotAllowed(OPERATORS_ONLY))
+            return
         match message:
             case Ping():
                 self.outbox.put({"type": "pong", "t": message.t, "tick": tick_ms()})

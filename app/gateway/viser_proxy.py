@@ -53,9 +53,9 @@ async def _port(hub: "Hub") -> int:
 
 
 @router.get("/viser")
-async def to_page() -> RedirectResponse:
+async def to_page(request: Request) -> RedirectResponse:
     """The page's address ends in a slash; its WebSocket's does not."""
-    return RedirectResponse("/viser/", 308)
+    return RedirectResponse(f"{request.app.state.settings.root_path}/viser/", 308)
 
 
 @router.get("/viser/{path:path}")

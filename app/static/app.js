@@ -6,6 +6,7 @@ import { FrameSender } from "./core/frame-sender.js";
 import { grabStill } from "./core/jpeg.js";
 import { changesFor, INITIAL_STATE } from "./core/messages.js";
 import { OperatorLink } from "./core/operator-link.js";
+import { preflight } from "./core/preflight.js";
 import { SourceKeeper } from "./core/source-keeper.js";
 import { Stopper } from "./core/stopper.js";
 import { Store } from "./core/store.js";
@@ -17,6 +18,7 @@ import { keys } from "./ui/keys.js";
 import { Notices } from "./ui/notices.js";
 import { operatorView, sourceChoices } from "./ui/operator-view.js";
 import { isDriving, keepRootClasses, preparePage } from "./ui/page.js";
+import { preflightContent } from "./ui/preflight.js";
 import { readout } from "./ui/readout.js";
 import { sentence } from "./ui/sentence.js";
 import { askContent, goneContent, helpContent, Sheets } from "./ui/sheets.js";
@@ -94,6 +96,8 @@ new ResizeObserver(([entry]) => {
 
 let hadSession = false;
 let signInCheck = 0;
+const CLOSED_TRIES = 3; // REST answers and the WebSocket never opened: that has a cause here
+let closedTries = 0;
 
 link.addEventListener("state", async ({ detail }) => {
     if (detail.state === "open") sendView();
@@ -101,8 +105,10 @@ link.addEventListener("state", async ({ detail }) => {
     if (detail.state === "waiting") {
         // A browser does not say why a WebSocket was refused; REST does.
         const check = ++signInCheck;
+        let answered = false;
         try {
             await api.robots();
+            answered = true;
         } catch (error) {
             if (error.status === 401 && check === signInCheck && !link.isOpen) {
                 store.set({ connection: { state: "signed-out" } });
@@ -110,6 +116,7 @@ link.addEventListener("state", async ({ detail }) => {
             }
         }
         if (check !== signInCheck || link.isOpen) return;
+        if (answered && !hadSession && ++closedTries === CLOSED_TRIES) checkBrowser();
         if (store.state.connection.state === "signed-out") return;
     }
     if (detail.state === "connecting" && store.state.connection.state !== "open") {
@@ -353,6 +360,14 @@ async function teach(gesture = null) {
     sheets.show("teach", title, content, { onclose: close, focus });
 }
 
+/** Try out what the page needs, and say what is missing and how to mend it. */
+async function checkBrowser() {
+    const { content, show, done } = preflightContent();
+    sheets.show("preflight", texts.preflight.title, content);
+    await preflight(show, { running: store.state.source.state === "running" });
+    done();
+}
+
 async function reset() {
     if (link.send("reset")) return;
     try {
@@ -400,7 +415,7 @@ const wishes = {
     "reset-scene": askResetScene,
     help: () => {
         if (sheets.name === "help") sheets.close();
-        else sheets.show("help", texts.help.title, helpContent());
+        else sheets.show("help", texts.help.title, helpContent(checkBrowser));
     },
     "edit-gesture": ({ id }) => {
         const gesture = store.state.gestures.find((candidate) => candidate.id === id);

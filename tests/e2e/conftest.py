@@ -62,10 +62,13 @@ def open_page(
         width: int = 1280,
         height: int = 800,
         allow_errors: bool = False,
+        untrusted: bool = False,
     ) -> Page:
         arguments = list(BASE_ARGUMENTS)
         if webcam is not None:
             arguments.append(f"--use-file-for-fake-video-capture={webcam}")
+        if untrusted:
+            arguments.append("--ignore-certificate-errors")
         if camera_allowed:
             arguments.append("--use-fake-ui-for-media-stream")
         browser = playwright.chromium.launch(executable_path=chromium, args=arguments)

@@ -73,7 +73,7 @@ def start_server(
         )  # fmt: skip
     assert process.stdout is not None
     for line in process.stdout:
-        found = re.search(r"(https?://[^/\s]+)/\?token=\S+", line)
+        found = re.search(r"(https?://[^/\s]+)\S*/\?token=\S+", line)
         if found:
             return Server(process, found[1], found[0], folder / "data", log)
     raise AssertionError(f"the server printed no link:\n{log.read_text()}")

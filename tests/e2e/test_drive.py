@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
+from app.gateway.tokens import TokenStore
 from app.gestures.synthetic import Step, SyntheticOperator, write_mjpeg
 from tests.e2e.conftest import OpenPage
 from tests.e2e.running import TOKEN, Server, wait_for
@@ -196,3 +197,27 @@ def test_a_wrong_token_opens_nothing(server: Server, open_page: OpenPage) -> Non
     page = open_page(server.url + "/?token=wrong-" + TOKEN, allow_errors=True)
     expect(page.locator("input")).to_be_visible()
     assert page.evaluate("window.farhand === undefined")
+
+
+def test_an_observer_watches_and_stops(server: Server, open_page: OpenPage) -> None:
+    secret = TokenStore(server.data_dir / "tokens.json").make("observer", "Anna").secret
+    page = open_page(server.link.replace(TOKEN, secret))
+    wait_for(page, "window.farhand?.robot?.mode === 'disarmed'")
+    wait_for(page, "window.farhand.pictures.scene > 2")
+    for hidden in ("#operator", "#btn-control", "#btn-arm", "#teach-open"):
+        assert not page.is_visible(hidden), hidden
+    page.keyboard.press("Space")
+    wait_for(page, "window.farhand.robot.mode === 'stopped'")
+    expect(page.locator("#sentence")).to_contain_text("An operator can reset it", timeout=SLOW)
+
+
+def test_the_check_of_the_browser_finds_nothing_missing(
+    server: Server, open_page: OpenPage, showing_up: Path
+) -> None:
+    page = open_page(server.link, webcam=showing_up)
+    wait_for(page, "window.farhand?.robot?.mode === 'disarmed'")
+    page.click("#help-open")
+    page.click("#preflight-open")
+    page.wait_for_selector("[data-done]", timeout=SLOW)
+    found = page.locator("#preflight li").evaluate_all("all => all.map((li) => li.dataset.code)")
+    assert found == ["fine"] * 3

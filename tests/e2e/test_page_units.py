@@ -304,6 +304,44 @@ def test_a_held_gesture_while_the_arm_stands(
     assert run(modules, "ui/sentence.js", "return m.sentenceFor(a, 100)", state) == expected
 
 
+def test_an_observer_is_told_to_watch(modules: Page) -> None:
+    state: dict[str, Any] = {
+        "connection": {"state": "open"},
+        "hello": {"session": "me", "role": "observer"},
+        "robot": {"mode": "disarmed", "controller": None, "online": True},
+        "source": {"state": "none"},
+    }
+
+    def told() -> str:
+        return str(run(modules, "ui/sentence.js", "return m.sentenceFor(a, 100)", state))
+
+    assert told() == "Nobody drives. You watch, and can stop the robot."
+    state["robot"]["controller"] = "operator-1"
+    assert told() == "operator-1 drives. You watch; your gestures move nothing."
+    state["robot"]["mode"] = "stopped"
+    assert told() == "Stopped. An operator can reset it."
+
+
+def test_every_finding_of_the_check_has_words(modules: Page) -> None:
+    codes = {"camera": ("denied", "none", "busy", "insecure", "unsupported", "odd")}
+    codes |= {"socket": ("blocked",), "webgl": ("off",)}
+    for what, problems in codes.items():
+        for code in ("fine", *problems):
+            finding = {"what": what, "code": code}
+            said = run(modules, "ui/preflight.js", "return m.describeFinding(a)", finding)
+            assert said["title"], finding
+            assert bool(said["words"]) is (code != "fine"), finding
+
+
+def test_the_check_finds_what_is_missing(modules: Page) -> None:
+    # The server of these tests has no WebSockets, and nobody allows the camera here.
+    script = "const all = []; await m.preflight((f) => all.push(f)); return all"
+    found = {each["what"]: each["code"] for each in run(modules, "core/preflight.js", script)}
+    assert list(found) == ["socket", "camera", "webgl"]
+    assert found["socket"] == "blocked"
+    assert found["camera"] in ("denied", "none")
+
+
 def holding(doubt: str | None, reason: str) -> dict[str, Any]:
     """A store of one who drives an arm that holds still."""
     return {

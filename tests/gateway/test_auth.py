@@ -1,21 +1,21 @@
 """Who may come in, with real requests."""
 
-import os
+import ipaddress
 import socket
-import stat
 from pathlib import Path
 
 import httpx
 import pytest
-from pydantic import SecretStr
 from starlette.datastructures import Headers
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from app.config import Settings
-from app.errors import CannotStart, NotAllowed, NotSignedIn, RequestError
-from app.gateway.auth import Gatekeeper, is_loopback, load_token, same_host
+from app.errors import NotAllowed, NotSignedIn, RequestError
+from app.gateway.auth import Gatekeeper, Identity, is_loopback, same_host
 from app.gateway.serve import LOG_CONFIG
+from app.gateway.throttle import TooManyGuesses
+from app.gateway.tokens import GIVEN, TokenStore
 from tests.gateway.running import BEARER, TOKEN, Running
 
 HTML = {"Accept": "text/html,*/*"}
@@ -30,56 +30,6 @@ def cookie_of(server: Running) -> str:
         answer = client.get("/", params={"token": TOKEN})
         assert answer.status_code == 303
         return answer.headers["set-cookie"].partition(";")[0]
-
-
-# The token
-
-
-def test_a_token_is_made_once_and_kept_private(tmp_path: Path) -> None:
-    settings = Settings(data_dir=tmp_path / "new" / "data")
-    token = load_token(settings)
-    assert len(token) >= 22
-    assert load_token(settings) == token
-    path = settings.data_dir / "token"
-    assert stat.S_IMODE(path.stat().st_mode) == 0o600
-    assert path.read_text().strip() == token
-
-
-def test_two_data_folders_have_two_tokens(tmp_path: Path) -> None:
-    first = load_token(Settings(data_dir=tmp_path / "a"))
-    assert load_token(Settings(data_dir=tmp_path / "b")) != first
-
-
-def test_a_token_file_that_is_cut_short_is_made_anew(tmp_path: Path) -> None:
-    (tmp_path / "token").write_text("abc\n")
-    token = load_token(Settings(data_dir=tmp_path))
-    assert len(token) == 43
-    assert (tmp_path / "token").read_text() == token + "\n"
-
-
-def test_a_token_file_open_to_others_is_closed(tmp_path: Path) -> None:
-    path = tmp_path / "token"
-    path.write_text("x" * 43)
-    path.chmod(0o644)
-    assert load_token(Settings(data_dir=tmp_path)) == "x" * 43
-    assert stat.S_IMODE(path.stat().st_mode) == 0o600
-
-
-def test_a_given_token_is_used_and_not_written(tmp_path: Path) -> None:
-    assert load_token(Settings(data_dir=tmp_path, token=SecretStr("secret"))) == "secret"
-    assert not (tmp_path / "token").exists()
-
-
-@pytest.mark.parametrize("token", ["", "two words", "grün", "tab\t"])
-def test_a_token_that_cannot_be_sent_is_refused(tmp_path: Path, token: str) -> None:
-    with pytest.raises(CannotStart, match="printable ASCII without spaces"):
-        load_token(Settings(data_dir=tmp_path, token=SecretStr(token)))
-
-
-def test_a_data_folder_that_cannot_be_made_is_one_clear_error(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(CannotStart, match="choose another --data-dir or give --token"):
-        load_token(Settings(data_dir=tmp_path / "file" / "data"))
 
 
 # The gatekeeper
@@ -130,76 +80,169 @@ def test_same_host(origin: str, host: str, same: bool) -> None:
     assert same_host(origin, host) is same
 
 
-def test_the_cookie_neither_holds_nor_is_the_token() -> None:
-    gatekeeper = Gatekeeper(TOKEN, secure=False)
-    cookie = gatekeeper.set_cookie_header()
+OPERATOR = {
+    how: Identity(GIVEN, "operator", how)  # type: ignore[arg-type]
+    for how in ("bearer", "cookie")
+}
+
+
+def gatekeeper(folder: Path, *, secure: bool = False, token: str = TOKEN) -> Gatekeeper:
+    return Gatekeeper(TokenStore(folder / "tokens.json", token), secure=secure)
+
+
+def test_the_cookie_neither_holds_nor_is_the_token(tmp_path: Path) -> None:
+    cookie = gatekeeper(tmp_path).set_cookie_header(TOKEN)
     assert TOKEN not in cookie
-    assert "HttpOnly" in cookie
-    assert "SameSite=Strict" in cookie
-    assert "Path=/" in cookie
-    assert "Secure" not in cookie
-    assert "Secure" in Gatekeeper(TOKEN, secure=True).set_cookie_header()
-    name = cookie.partition("=")[0]
-    assert Gatekeeper("another token", secure=False).cookie_name != name
+    assert cookie.startswith("farhand_")
+    assert cookie.endswith("; Path=/; HttpOnly; SameSite=Strict")
+    secure = gatekeeper(tmp_path, secure=True).set_cookie_header(TOKEN)
+    assert secure.startswith("__Host-farhand_")
+    assert secure.endswith("; Path=/; HttpOnly; SameSite=Strict; Secure")
+    assert "Domain" not in secure
+    # Two servers on one machine, whose cookies browsers would mix.
+    other = gatekeeper(tmp_path / "other").set_cookie_header(TOKEN)
+    assert other.partition("=")[0] != cookie.partition("=")[0]
 
 
-def test_a_wrong_bearer_is_not_saved_by_a_good_cookie() -> None:
-    gatekeeper = Gatekeeper(TOKEN, secure=False)
-    cookie = gatekeeper.set_cookie_header().partition(";")[0]
-    assert gatekeeper.credential(headers(cookie=cookie)) == "cookie"
-    assert gatekeeper.credential(headers(cookie=cookie, authorization="Bearer no")) is None
+def test_a_wrong_bearer_is_not_saved_by_a_good_cookie(tmp_path: Path) -> None:
+    door = gatekeeper(tmp_path)
+    cookie = door.set_cookie_header(TOKEN).partition(";")[0]
+    assert door.identify(headers(cookie=cookie)) == OPERATOR["cookie"]
+    assert door.identify(headers(cookie=cookie, authorization="Bearer no")) is None
 
 
 @pytest.mark.parametrize(
     "value",
     ["Bearer", "Bearer ", "Basic dXNlcjpwYXNz", f"Basic {TOKEN}", TOKEN, f"Bearer {TOKEN}x"],
 )
-def test_other_authorizations_do_not_fit(value: str) -> None:
-    assert Gatekeeper(TOKEN, secure=False).credential(headers(authorization=value)) is None
+def test_other_authorizations_do_not_fit(tmp_path: Path, value: str) -> None:
+    assert gatekeeper(tmp_path).identify(headers(authorization=value)) is None
 
 
-def test_cookies_need_our_origin_where_they_could_do_harm() -> None:
-    gatekeeper = Gatekeeper(TOKEN, secure=False)
-    cookie = gatekeeper.set_cookie_header().partition(";")[0]
+def test_the_token_is_not_a_cookie_nor_the_cookie_a_token(tmp_path: Path) -> None:
+    door = gatekeeper(tmp_path)
+    name, _, value = door.set_cookie_header(TOKEN).partition(";")[0].partition("=")
+    assert door.identify(headers(cookie=f"{name}={TOKEN}")) is None
+    assert door.identify(headers(authorization=f"Bearer {value}")) is None
+
+
+def test_cookies_need_our_origin_where_they_could_do_harm(tmp_path: Path) -> None:
+    door = gatekeeper(tmp_path)
+    cookie = door.set_cookie_header(TOKEN).partition(";")[0]
     host = "localhost:8000"
     ours = headers(cookie=cookie, host=host, origin=f"http://{host}")
     foreign = headers(cookie=cookie, host=host, origin="https://evil.example")
     none = headers(cookie=cookie, host=host)
     for method in ("POST", "PATCH", "DELETE", "PUT"):
-        assert gatekeeper.admit(ours, method, websocket=False) == "cookie"
+        assert door.admit(ours, method, websocket=False) == OPERATOR["cookie"]
         for bad in (foreign, none):
             with pytest.raises(NotAllowed):
-                gatekeeper.admit(bad, method, websocket=False)
-    assert gatekeeper.admit(ours, "GET", websocket=True) == "cookie"
+                door.admit(bad, method, websocket=False)
+    assert door.admit(ours, "GET", websocket=True) == OPERATOR["cookie"]
     for bad in (foreign, none):
         with pytest.raises(NotAllowed):
-            gatekeeper.admit(bad, "GET", websocket=True)
-        assert gatekeeper.admit(bad, "GET", websocket=False) == "cookie"
+            door.admit(bad, "GET", websocket=True)
+        assert door.admit(bad, "GET", websocket=False) == OPERATOR["cookie"]
     # A program that knows the token comes from nowhere.
     bearer = headers(host=host, authorization=f"Bearer {TOKEN}", origin="https://evil.example")
-    assert gatekeeper.admit(bearer, "POST", websocket=False) == "bearer"
+    assert door.admit(bearer, "POST", websocket=False) == OPERATOR["bearer"]
     with pytest.raises(NotSignedIn):
-        gatekeeper.admit(headers(host=host), "GET", websocket=False)
+        door.admit(headers(host=host), "GET", websocket=False)
+
+
+def test_over_https_a_plain_page_of_the_same_name_is_foreign(tmp_path: Path) -> None:
+    # Whoever sits between may answer plain HTTP in our name.
+    door = gatekeeper(tmp_path, secure=True)
+    cookie = door.set_cookie_header(TOKEN).partition(";")[0]
+    host = "arm.example:8000"
+    good = headers(cookie=cookie, host=host, origin=f"https://{host}")
+    assert door.admit(good, "POST", websocket=False) == OPERATOR["cookie"]
+    with pytest.raises(NotAllowed, match="http://arm"):
+        door.admit(
+            headers(cookie=cookie, host=host, origin=f"http://{host}"), "POST", websocket=False
+        )
+
+
+def test_observers_may_not_what_operators_may(tmp_path: Path) -> None:
+    door = gatekeeper(tmp_path)
+    secret, token = TokenStore(tmp_path / "tokens.json").make("observer", "Anna")
+    bearer = headers(authorization=f"Bearer {secret}")
+    watching = Identity(token.id, "observer", "bearer")
+    assert door.admit(bearer, "POST", websocket=False, access="signed in") == watching
+    with pytest.raises(NotAllowed, match="needs an operator"):
+        door.admit(bearer, "POST", websocket=False, access="operator")
+
+
+def at(tmp_path: Path, **settings: object) -> Gatekeeper:
+    given = Settings(data_dir=tmp_path, **settings)  # type: ignore[arg-type]
+    return Gatekeeper.from_settings(given, TokenStore(tmp_path / "tokens.json", TOKEN))
 
 
 @pytest.mark.parametrize(
     "host", ["evil.example", "evil.example:8000", "", "127.0.0.1.evil.example"]
 )
-def test_foreign_hosts_are_refused_on_loopback(host: str) -> None:
-    gatekeeper = Gatekeeper.from_settings(Settings(host="127.0.0.1"), TOKEN)
+def test_foreign_hosts_are_refused_on_loopback(tmp_path: Path, host: str) -> None:
+    door = at(tmp_path, host="127.0.0.1")
     with pytest.raises(RequestError, match="does not answer for the host"):
-        gatekeeper.check_host(headers(host=host))
+        door.check_host(headers(host=host))
     for good in ("localhost:1", "127.0.0.1:8000", "[::1]:9", "LocalHost"):
-        gatekeeper.check_host(headers(host=good))
+        door.check_host(headers(host=good))
 
 
-def test_off_loopback_any_host_unless_named() -> None:
-    Gatekeeper.from_settings(Settings(host="0.0.0.0"), TOKEN).check_host(headers(host="a.example"))
-    settings = Settings(host="0.0.0.0", gateway={"allowed_hosts": ["farhand.example"]})
-    gatekeeper = Gatekeeper.from_settings(settings, TOKEN)
-    gatekeeper.check_host(headers(host="farhand.example:443"))
+def test_two_host_headers_are_refused(tmp_path: Path) -> None:
+    twice = Headers(raw=[(b"host", b"localhost"), (b"host", b"evil.example")])
     with pytest.raises(RequestError):
-        gatekeeper.check_host(headers(host="a.example"))
+        at(tmp_path, host="127.0.0.1").check_host(twice)
+
+
+def test_off_loopback_any_host_unless_named_or_certified(tmp_path: Path) -> None:
+    proxied = {"host": "0.0.0.0", "behind_proxy": True}
+    at(tmp_path, **proxied).check_host(headers(host="a.example"))
+    door = at(tmp_path, **proxied, gateway={"allowed_hosts": ["farhand.example"]})
+    door.check_host(headers(host="farhand.example:443"))
+    with pytest.raises(RequestError):
+        door.check_host(headers(host="a.example"))
+    certified = Gatekeeper.from_settings(
+        Settings(host="0.0.0.0"), TokenStore(tmp_path / "tokens.json"), lambda: ("arm", "10.0.0.7")
+    )
+    certified.check_host(headers(host="10.0.0.7:8000"))
+    with pytest.raises(RequestError):
+        certified.check_host(headers(host="a.example"))
+
+
+# Behind a proxy
+
+
+def scope(peer: str | None, *forwarded: str) -> dict[str, object]:
+    fields = [(b"x-forwarded-for", value.encode()) for value in forwarded]
+    return {"type": "http", "client": peer and (peer, 1), "headers": fields}
+
+
+def test_without_a_proxy_nobody_says_where_a_request_comes_from(tmp_path: Path) -> None:
+    assert at(tmp_path).client(scope("10.0.0.9", "1.2.3.4")) == "10.0.0.9"
+
+
+def test_only_the_proxy_is_answered_and_believed(tmp_path: Path) -> None:
+    door = at(tmp_path, behind_proxy=True)
+    assert door.client(scope("127.0.0.1", "203.0.113.9")) == "203.0.113.9"
+    assert door.client(scope("::ffff:127.0.0.1", "203.0.113.9")) == "203.0.113.9"
+    # What stands further left is what the client claims of itself.
+    assert door.client(scope("127.0.0.1", "6.6.6.6, 203.0.113.9")) == "203.0.113.9"
+    assert door.client(scope("127.0.0.1", "6.6.6.6", "203.0.113.9")) == "203.0.113.9"
+    assert door.client(scope("127.0.0.1")) == "127.0.0.1"
+    for stranger in ("192.168.1.5", "203.0.113.9", None, "unix"):
+        with pytest.raises(NotAllowed, match="--proxy-address") as refused:
+            door.client(scope(stranger, "127.0.0.1"))
+        assert refused.value.code == "not_through_proxy"
+
+
+def test_the_proxy_may_be_elsewhere(tmp_path: Path) -> None:
+    networks = (ipaddress.ip_network("172.16.0.0/12"),)
+    door = at(tmp_path, behind_proxy=True, proxy_addresses=networks)
+    # Two proxies of that network, one behind the other.
+    assert door.client(scope("172.17.0.1", "203.0.113.9, 172.18.0.4")) == "203.0.113.9"
+    with pytest.raises(NotAllowed):
+        door.client(scope("127.0.0.1"))
 
 
 # Over HTTP
@@ -220,6 +263,7 @@ def test_everything_but_the_door_needs_the_token(server: Running) -> None:
             "/viser/",
             "/static/app.js",
             "/nothing",
+            "/api/gestures/",
         ):
             answer = client.get(path)
             assert answer.status_code == 401, path
@@ -264,7 +308,7 @@ def test_a_signed_out_browser_sees_a_field_for_the_token(server: Running) -> Non
         assert "script-src" not in page.headers["content-security-policy"]
         wrong = client.post("/signin", data={"token": "wrong"})
         assert wrong.status_code == 401
-        assert "not the one of this server" in wrong.text
+        assert "not one of this server" in wrong.text
         right = client.post("/signin", data={"token": f" {TOKEN} "})
         assert right.status_code == 303
         assert client.get("/").status_code == 200
@@ -355,9 +399,46 @@ def test_no_secret_reaches_the_log(server: Running, caplog: pytest.LogCaptureFix
     assert not any(TOKEN in record.getMessage() for record in ours)
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_a_token_file_without_rights_is_one_clear_error(tmp_path: Path) -> None:
-    (tmp_path / "token").write_text("x" * 43)
-    (tmp_path / "token").chmod(0)
-    with pytest.raises(CannotStart, match="cannot be used"):
-        load_token(Settings(data_dir=tmp_path))
+def test_a_bearer_that_is_wrong_too_often_is_not_looked_at(tmp_path: Path) -> None:
+    door = gatekeeper(tmp_path)
+    right = headers(authorization=f"Bearer {TOKEN}")
+    wrong = [headers(authorization=f"Bearer wrong-{number}") for number in range(6)]
+    assert door.identify(right, "10.0.0.1") is not None
+    for guess in wrong[:5]:
+        assert door.identify(guess, "10.0.0.1") is None
+    with pytest.raises(TooManyGuesses):
+        door.identify(wrong[5], "10.0.0.1")
+    # Who was right there before, and who comes from elsewhere, is let in.
+    assert door.identify(right, "10.0.0.1") is not None
+    assert door.identify(right, "10.0.0.2") is not None
+    # A guesser whose sixth guess is right learns nothing.
+    for guess in wrong[:5]:
+        door.identify(guess, "10.0.0.3")
+    with pytest.raises(TooManyGuesses):
+        door.identify(right, "10.0.0.3")
+
+
+def test_guesses_are_refused_from_the_sixth_and_disturb_nobody(server: Running) -> None:
+    cookie = {"Cookie": cookie_of(server)}
+    with server.operator(additional_headers=cookie, origin=server.url) as operator:
+        with anonymous(server) as client:
+            answers = [
+                client.get("/api/robots", headers={"Authorization": f"Bearer guess-{number}"})
+                for number in range(300)
+            ]
+            answers += [client.get("/", params={"token": f"link-{n}"}) for n in range(100)]
+            answers += [client.post("/signin", data={"token": f"form-{n}"}) for n in range(100)]
+        assert [answer.status_code for answer in answers] == [401] * 5 + [429] * 495
+        assert all(a.json()["error"]["code"] == "too_many_guesses" for a in answers[5:])
+        assert answers[5].headers["retry-after"] == "60"
+        operator.next("robot")
+        operator.send("ping", t=1.0)
+        operator.next("pong", t=1.0)
+        # With the token that was right here before, and with the cookie.
+        assert server.http.get("/api/robots").status_code == 200
+        with anonymous(server, **cookie) as client:
+            assert client.get("/api/robots").status_code == 200
+    with anonymous(server, **HTML) as client:
+        page = client.post("/signin", data={"token": "guess"})
+        assert page.status_code == 429
+        assert "too many wrong tokens" in page.text

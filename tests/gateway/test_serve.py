@@ -1,7 +1,10 @@
 """Running the server as a program does."""
 
+import asyncio
+import io
 import os
 import re
+import shutil
 import signal
 import socket
 import ssl
@@ -15,11 +18,16 @@ from pathlib import Path
 import httpx
 import psutil
 import pytest
+from pydantic import SecretStr, ValidationError
 
 from app.config import Settings
 from app.errors import CannotStart
-from app.gateway.serve import bind, check_transport, link
-from tests.gateway.running import StandIn, wait_for
+from app.gateway.auth import is_loopback
+from app.gateway.greeting import address, greet, link
+from app.gateway.serve import bind, check_transport, keep_certificate, local_authority
+from app.gateway.tls import FOLDER, read_authority
+from app.gateway.tokens import TokenStore
+from tests.gateway.running import TOKEN, StandIn, running, settings_for, wait_for
 
 SCRIPT = """
 import sys
@@ -40,6 +48,7 @@ except FarhandError as error:
     sys.exit(1)
 """
 ROOT = Path(__file__).parents[2]
+HTML = {"Accept": "text/html"}
 
 pytestmark = pytest.mark.timeout(180)
 
@@ -178,12 +187,170 @@ def test_https(folder: Path, node: StandIn, certificate: tuple[str, str]) -> Non
             assert "Secure" in answer.headers["set-cookie"]
 
 
-def test_off_loopback_plain_http_is_refused() -> None:
-    with pytest.raises(CannotStart, match="give --tls-cert and --tls-key, or --behind-proxy"):
-        check_transport(Settings(host="0.0.0.0"))
-    check_transport(Settings(host="0.0.0.0", behind_proxy=True))
-    check_transport(Settings(host="127.0.0.1"))
-    check_transport(Settings(host="localhost"))
+def test_off_loopback_a_certificate_is_made(folder: Path, node: StandIn) -> None:
+    data = folder / "data"
+    with program(data, node.endpoint, host="0.0.0.0") as process:
+        url, token = read_link(process)
+        assert url.startswith("https://")
+        port = url.rpartition(":")[2]
+        authority = read_authority(data / FOLDER)
+        assert authority is not None
+        trust = ssl.create_default_context(cadata=authority.pem.decode())
+        with httpx.Client(verify=trust, trust_env=False) as client:
+            for host in ("localhost", "127.0.0.1"):
+                answer = client.get(f"https://{host}:{port}/", params={"token": token})
+                assert answer.status_code == 303
+                assert answer.headers["set-cookie"].startswith("__Host-farhand_")
+            # Everybody may know whom to trust.
+            page = client.get(f"https://localhost:{port}/trust")
+            assert authority.fingerprint in page.text
+            assert client.get(f"https://localhost:{port}/trust/ca.pem").content == authority.pem
+            assert client.get(f"https://localhost:{port}/trust/ca.crt").content == authority.der
+            foreign = client.get(f"https://localhost:{port}/api/health", headers={"Host": "evil"})
+            assert foreign.status_code == 400
+            # Who forgets the "https://" is told, and nothing said in the clear is used.
+            plain = client.get(f"http://127.0.0.1:{port}/", params={"token": token})
+            assert plain.status_code == 400
+            assert f"https://127.0.0.1:{port}/" in plain.text
+            assert token not in plain.text
+            assert "set-cookie" not in plain.headers
+    # The next start uses the same.
+    assert read_authority(data / FOLDER) == authority
+
+
+def test_only_the_own_port_is_reached_from_outside(folder: Path) -> None:
+    """Node, camera process and viser listen on loopback or on files alone."""
+    with program(folder / "data", host="0.0.0.0") as process:
+        url, token = read_link(process)
+        port = int(url.rpartition(":")[2])
+        bearer = {"Authorization": f"Bearer {token}"}
+        authority = read_authority(folder / "data" / FOLDER)
+        assert authority is not None
+        trust = ssl.create_default_context(cadata=authority.pem.decode())
+        with httpx.Client(headers=bearer, verify=trust, trust_env=False, timeout=60) as client:
+            here = f"https://localhost:{port}"
+            # All parts are up: the node with its cameras, and the 3D view.
+            for path in ("api/cameras/wrist.jpg", "viser/"):
+                wait_for(
+                    lambda path=path: client.get(f"{here}/{path}").status_code == 200, path, 60
+                )
+            family = [psutil.Process(process.pid)]
+            family += family[0].children(recursive=True)
+            assert len(family) >= 3
+            listening = [
+                connection.laddr
+                for each in family
+                for connection in each.net_connections(kind="inet")
+                if connection.status == psutil.CONN_LISTEN or connection.type == socket.SOCK_DGRAM
+            ]
+    loopback = [address for address in listening if is_loopback(address.ip)]
+    assert [(address.ip, address.port) for address in listening if address not in loopback] == [
+        ("0.0.0.0", port)
+    ]
+    # viser's, which the test would have seen anywhere else.
+    assert len(loopback) == 1
+
+
+def test_a_certificate_is_made_only_where_none_is_given(tmp_path: Path) -> None:
+    cert = tmp_path / "a"
+    for settings in (
+        Settings(host="127.0.0.1", data_dir=tmp_path),
+        Settings(host="0.0.0.0", data_dir=tmp_path, behind_proxy=True),
+        Settings(host="0.0.0.0", data_dir=tmp_path, tls_cert=cert, tls_key=cert),
+    ):
+        assert local_authority(settings) is None
+    assert list(tmp_path.iterdir()) == []
+    settings = Settings(
+        host="0.0.0.0", data_dir=tmp_path, gateway={"allowed_hosts": ["arm.example"]}
+    )
+    authority = local_authority(settings)
+    assert authority is not None
+    assert "arm.example" in authority.names.dns
+
+
+def test_settings_of_a_proxy_need_one() -> None:
+    with pytest.raises(CannotStart, match="give --behind-proxy, too"):
+        check_transport(Settings(root_path="/farhand"))
+    for path in ("/api", "/static/farhand"):
+        with pytest.raises(CannotStart, match="which Farhand uses itself"):
+            check_transport(Settings(root_path=path, behind_proxy=True))
+    check_transport(Settings(root_path="/arms/farhand", behind_proxy=True))
+    for path in ("farhand", "/farhand/", "/", "/a b", "/a?b", "//evil.example"):
+        with pytest.raises(ValidationError):
+            Settings(root_path=path)
+
+
+async def test_a_given_certificate_that_changes_is_read_again(
+    certificate: tuple[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cert, key = (Path(shutil.copy(path, tmp_path)) for path in certificate)
+    monkeypatch.setattr("app.gateway.serve.CERTIFICATE_CHECK_S", 0.01)
+    loaded = []
+
+    class Context(ssl.SSLContext):
+        def load_cert_chain(self, *files: Path) -> None:  # type: ignore[override]
+            super().load_cert_chain(*files)
+            loaded.append(files)
+
+    context = Context(ssl.PROTOCOL_TLS_SERVER)
+    settings = Settings(tls_cert=cert, tls_key=key)
+    keeping = asyncio.create_task(keep_certificate(context, settings, None))
+    try:
+        await asyncio.sleep(0)
+        os.utime(cert, ns=(1, 1))
+        while not loaded:
+            await asyncio.sleep(0.01)
+        # What is broken changes nothing, and is tried again when it changes again.
+        text = key.read_text()
+        key.write_text("nonsense")
+        os.utime(key, ns=(2, 2))
+        await asyncio.sleep(0.05)
+        assert not keeping.done()
+        count = len(loaded)
+        key.write_text(text)
+        while len(loaded) == count:
+            await asyncio.sleep(0.01)
+        assert loaded[-1] == (cert, key)
+    finally:
+        keeping.cancel()
+        await asyncio.gather(keeping, return_exceptions=True)
+
+
+@pytest.mark.parametrize("cut", [False, True])
+def test_everything_works_below_a_path(folder: Path, node: StandIn, cut: bool) -> None:
+    """Proxies that pass the prefix on, and proxies that cut it off."""
+    settings = settings_for(folder, node.endpoint).model_copy(
+        update={"root_path": "/arms/one", "behind_proxy": True}
+    )
+    sent = "" if cut else "/arms/one"
+    with running(settings) as server:
+        http = server.http
+        assert http.get(f"{sent}/api/health").json()["robots"]
+        page = http.get(f"{sent}/")
+        assert page.status_code == 200
+        assert http.get(f"{sent}/static/app.js").status_code == 200
+        assert http.get(f"{sent}/static/media/operator.json").status_code == 200
+        # Nothing in the page begins at the root of the host.
+        assert not re.search(r"""(src|href|action)=["']/""", page.text)
+        assert http.get(f"{sent}/viser").headers["location"] == "/arms/one/viser/"
+        with httpx.Client(base_url=server.url, headers=HTML, trust_env=False) as client:
+            signed_out = client.get(f"{sent}/")
+            assert 'action="/arms/one/signin"' in signed_out.text
+            assert 'href="/arms/one/trust"' in signed_out.text
+            answer = client.get(f"{sent}/", params={"token": TOKEN})
+            assert answer.status_code == 303
+            assert answer.headers["location"] == "/arms/one/"
+            cookie = answer.headers["set-cookie"]
+            assert "; Path=/;" in cookie
+        values = {"Cookie": cookie.partition(";")[0]}
+        origin = f"https://{server.host}"
+        with server.socket(f"{sent}/ws/operator", additional_headers=values, origin=origin):
+            pass
+        if not cut:
+            moved = http.get("/arms/one")
+            assert (moved.status_code, moved.headers["location"]) == (308, "/arms/one/")
+        assert http.get("/arms/two/api/health").status_code == 404
+        assert "/arms/one" not in http.get(f"{sent}/api/nothing").json()["error"]["message"]
 
 
 def test_half_or_broken_certificates_are_refused(tmp_path: Path) -> None:
@@ -205,6 +372,50 @@ def test_addresses_that_cannot_be_had_are_clear() -> None:
 
 
 def test_links() -> None:
-    assert link(Settings(), 8000, "t") == "http://127.0.0.1:8000/?token=t"
-    assert link(Settings(host="::1"), 8000, "t") == "http://[::1]:8000/?token=t"
-    assert "0.0.0.0" not in link(Settings(host="0.0.0.0"), 8000, "t")
+    assert link(address(Settings(), 8000, None), "t") == "http://127.0.0.1:8000/?token=t"
+    assert address(Settings(host="::1"), 8000, None) == "http://[::1]:8000/"
+    assert "0.0.0.0" not in address(Settings(host="0.0.0.0"), 8000, None)
+    below = Settings(root_path="/arm", behind_proxy=True)
+    assert address(below, 8000, None) == "http://127.0.0.1:8000/arm/"
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_terminal_gets_codes_and_a_link_to_watch(tmp_path: Path) -> None:
+    settings = Settings(host="0.0.0.0", data_dir=tmp_path)
+    authority = local_authority(settings)
+    assert authority is not None
+    tokens = TokenStore.from_settings(settings)
+    out = Terminal()
+    greet(settings, 8000, tokens, authority, out)
+    text = out.getvalue()
+    secrets = list(dict.fromkeys(re.findall(r"token=(\S+)", text)))
+    found = [tokens.by_secret(secret) for secret in secrets]
+    assert [token and token.role for token in found] == ["operator", "observer"]
+    assert all(token and token.expires for token in found)
+    assert "█" in text or "▄" in text
+    assert authority.public.fingerprint in text
+    # The first line is the one that programs read.
+    assert re.fullmatch(r"https://\S+:8000/\?token=\S+", text.splitlines()[0])
+
+
+def test_without_a_terminal_it_is_one_line_and_a_restart_signs_nobody_out(tmp_path: Path) -> None:
+    settings = Settings(data_dir=tmp_path)
+    tokens = TokenStore.from_settings(settings)
+    secrets = []
+    for _ in range(6):
+        out = io.StringIO()
+        greet(settings, 8000, tokens, None, out)
+        assert out.getvalue().count("\n") == 1
+        secrets.append(out.getvalue().strip().rpartition("token=")[2])
+    assert tokens.by_secret(secrets[0]) is None
+    assert all(tokens.by_secret(secret) for secret in secrets[1:])
+    # A token that was given is printed, and none is made.
+    given = settings.model_copy(update={"token": SecretStr("T" * 32)})
+    out = io.StringIO()
+    greet(given, 8000, TokenStore.from_settings(given), None, out)
+    assert out.getvalue() == f"http://127.0.0.1:8000/?token={'T' * 32}\n"
+    assert len(tokens.list()) == 5

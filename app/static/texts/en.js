@@ -114,6 +114,8 @@ export const texts = Object.freeze({
         faultUnknown: "no reason given",
         stopped: (why) => (why ? `Stopped: ${why}.` : "Stopped."),
         stoppedNext: "Reset when it is safe; that moves nothing.",
+        stoppedWatch: "An operator can reset it.",
+        watching: "Nobody drives. You watch, and can stop the robot.",
         noSource: "Show the robot a hand: use your camera, or try it without one.",
         sourceStarting: "Waiting for the camera. Allow it in the browser if asked.",
         noControl: "Take control to drive.",
@@ -401,6 +403,35 @@ export const texts = Object.freeze({
         reconnected: "Connected again. Take control and arm to drive on.",
         lostControl: "You no longer drive.",
         dismiss: "Dismiss",
+    },
+
+    preflight: {
+        title: "Check this browser",
+        open: "Check camera, connection and 3D view",
+        checking: "Checking; the browser may ask for the camera…",
+        none: "All is well.",
+        some: "Something is missing. This is how to mend it:",
+        fine: {
+            camera: "The camera can be used",
+            socket: "Live connections reach the server",
+            webgl: "3D can be drawn",
+        },
+        problems: {
+            socket: {
+                title: "Live connections (WebSockets) are blocked",
+                words:
+                    "The page arrives, and what moves the robot does not. A proxy, a filter or a " +
+                    "browser extension stops it: switch the extension off, try another network, or " +
+                    "ask who runs the proxy to let WebSockets through. If the browser warns of the " +
+                    "certificate, it must trust it first: open /trust at this address.",
+            },
+            webgl: {
+                title: "3D cannot be drawn (WebGL is off)",
+                words:
+                    "Driving works without it, by the camera pictures. To have it, switch on " +
+                    "hardware acceleration in the browser's settings, or use a current browser.",
+            },
+        },
     },
 
     help: {

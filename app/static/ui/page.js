@@ -38,6 +38,11 @@ export function isDriving(state) {
     );
 }
 
+/** Whether this page may only watch, and stop. */
+export function isObserver(state) {
+    return Boolean(state.hello && state.hello.role === "observer");
+}
+
 /** Keep the root element's classes in step with the store. */
 export function keepRootClasses(root, store) {
     let mode = "mode-unknown";
@@ -47,6 +52,7 @@ export function keepRootClasses(root, store) {
         mode = now;
         root.classList.toggle("is-connected", state.connection.state === "open");
         root.classList.toggle("is-driving", isDriving(state));
+        root.classList.toggle("is-observer", isObserver(state));
         root.classList.toggle("is-armed", Boolean(state.robot && state.robot.armed));
         root.classList.toggle("has-source", state.source.state === "running");
         root.classList.toggle("is-stopping", state.stopping === "sending");

@@ -2,7 +2,7 @@
 
 import { texts } from "../texts/en.js";
 import { setText } from "./dom.js";
-import { isDriving, modeOf } from "./page.js";
+import { isDriving, isObserver, modeOf } from "./page.js";
 import { describeAction } from "./words.js";
 
 const words = texts.sentence;
@@ -58,9 +58,12 @@ export function sentenceFor(state, now) {
     const why = bare(robot.reason);
     if (mode === "faulted") return words.fault(bare(robot.fault) || words.faultUnknown);
     if (mode === "unknown") return words.noRobot;
-    if (mode === "stopped") return `${words.stopped(why)} ${words.stoppedNext}`;
+    if (mode === "stopped") {
+        return `${words.stopped(why)} ${isObserver(state) ? words.stoppedWatch : words.stoppedNext}`;
+    }
     if (!isDriving(state)) {
         if (robot.controller) return words.otherDrives(robot.controller);
+        if (isObserver(state)) return words.watching;
         if (state.source.state === "starting") return words.sourceStarting;
         if (state.source.state !== "running") return words.noSource;
         const gesture = seen(state);

@@ -62,8 +62,8 @@ export class Sheets {
     }
 }
 
-/** Contents of the help sheet. */
-export function helpContent() {
+/** Contents of the help sheet; `check` is called by its button. */
+export function helpContent(check) {
     const { how, keysTitle, keys, keysNote, safetyTitle, safety } = texts.help;
     return [
         el("ol", { class: "how" }, ...how.map((text) => el("li", { text }))),
@@ -76,6 +76,7 @@ export function helpContent() {
             ),
         ),
         el("p", { class: "quiet", text: keysNote }),
+        button(texts.preflight.open, { id: "preflight-open", onclick: check }),
         el("h3", { text: safetyTitle }),
         el("p", { text: safety }),
     ];
