@@ -14,9 +14,10 @@ from app.pipeline.template import HEIGHT, WIDTH
 from app.pipeline.types import F32, U8, Cause, Match
 from app.pipeline.views import Views
 
-OWN_REACH = 1.2
+OWN_REACH = 1.3
 OTHER_REACH = 0.9
-"""Factors of the calibration, measured on the digit signs (benchmarks/recognition.py)."""
+"""Factors of the calibration, measured on the digit signs: photographs, and other people's hands
+shown to five photographs a sign (benchmarks/streams)."""
 NEIGHBOURS, SHARE = 5, 0.6
 """Templates of a gesture that its distance is the mean of: the nearest ones, at most so many and at
 most this part of all, since a gesture may be shown in more than one way. On webcam photographs in
