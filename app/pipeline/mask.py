@@ -36,8 +36,10 @@ network errs: of webcam crops kept aside 0.95 are told apart at full size, 0.93 
 AGAIN, NEW = 5, 30
 """Frames after which the whole picture is looked at again although the hand is followed: the first
 when something changed beside it, the second in any case."""
-WORTH_IT = 0.6
-"""A second look is taken when its part is smaller than this part of the picture."""
+WORTH_IT, STAYS = 0.6, 0.1
+"""A second look is taken when its part is smaller than this part of the picture. In a stream the
+way taken is kept for so much beyond it: the two masks differ at the rim, and going to and fro
+would look like motion."""
 SAME_MEAN, SAME_MOST = 0.8, 6.0
 """Levels, mean and largest, between thumbnails of two pictures that show the same: sensor noise
 stays below when averaged, a finger tip that moves does not."""
@@ -83,6 +85,9 @@ class LearnedMask:
         self._session = load(MODEL)
         self._part: Box | None = None
         self._followed = 0
+        self._worth = WORTH_IT
+        self._anchor: Hand | None = None
+        """The hand by which part and fineness were chosen."""
         self._fine = math.inf
         self._around: U8 = np.empty(0, np.uint8)
         self._mask: U8 = np.empty(0, np.uint8)
@@ -107,7 +112,8 @@ class LearnedMask:
             self._mask = np.empty(pixels.shape[:2], np.uint8)
             self._part, self._fine = None, math.inf
         whole = (0, 0, pixels.shape[1], pixels.shape[0])
-        if self._part is not None and self._stale(thumb, self._part, whole):
+        followed, how_fine = self._part, self._fine
+        if followed is not None and self._stale(thumb, followed, whole):
             self._part, self._fine = None, math.inf
         bounds = self._part or whole
         share = self._look(pixels, bounds, self._fine)
@@ -118,16 +124,35 @@ class LearnedMask:
             hand = _palm(share, bounds, whole)
         if bounds == whole:
             self._followed, self._around, self.everything = 0, thumb, share
-            if hand and (part := _part_round(hand, whole)) is not None:
-                closer = self._look(pixels, part, FINE / hand.radius)
+            part, fine = None, 0.0
+            if hand:
+                part, fine = _part_round(hand, whole, self._worth), FINE / hand.radius
+            if hand and followed is not None and _inside(hand, followed, whole):
+                # It is still the hand that is followed: looked at from elsewhere, its rim would
+                # change, which looks like motion.
+                part, fine = followed, how_fine
+            if part is not None:
+                closer = self._look(pixels, part, fine)
                 if (seen := _palm(closer, part, whole)) is not None:
                     bounds, share, hand = part, closer, seen
+                    if part == followed:
+                        self._part, self._fine = followed, how_fine
         self._followed += 1
-        self._part = _part_round(hand, whole) if hand else None
-        fine = FINE if self._part else FINE_WHOLE
-        self._fine = fine / hand.radius if hand else math.inf
+        self._go_after(hand, bounds, whole)
         self._masked = self._spread(share, bounds)
         return self._masked
+
+    def _go_after(self, hand: Hand | None, bounds: Box, whole: Box) -> None:
+        """Choose what the next picture is looked at first: the same, for a hand that rests."""
+        if hand and self._anchor and bounds == (self._part or whole) and _rests(hand, self._anchor):
+            return
+        self._anchor = hand
+        self._worth = WORTH_IT
+        if hand:
+            self._worth += STAYS if bounds != whole else -STAYS
+        self._part = _part_round(hand, whole, self._worth) if hand else None
+        fine = FINE if self._part else FINE_WHOLE
+        self._fine = fine / hand.radius if hand else math.inf
 
     def look_round(self) -> None:
         """Look at the whole of the next picture that is not like this one."""
@@ -207,8 +232,8 @@ def _palm(share: F32, part: Box, whole: Box) -> Hand | None:
     )
 
 
-def _part_round(hand: Hand, whole: Box) -> Box | None:
-    """The part for a second look; None when it is not worth one."""
+def _part_round(hand: Hand, whole: Box, worth: float) -> Box | None:
+    """The part for a second look; None when it is more than ``worth`` of the picture."""
     far, aside, near = REACH * hand.radius, ASIDE * hand.radius, BEHIND * hand.radius
     reach = {
         None: (far, far, far, far),
@@ -220,9 +245,16 @@ def _part_round(hand: Hand, whole: Box) -> Box | None:
     left, top = max(0, int(hand.x - reach[0])), max(0, int(hand.y - reach[1]))
     right = min(whole[2], math.ceil(hand.x + reach[2]))
     bottom = min(whole[3], math.ceil(hand.y + reach[3]))
-    if (right - left) * (bottom - top) >= WORTH_IT * whole[2] * whole[3]:
+    if (right - left) * (bottom - top) >= worth * whole[2] * whole[3]:
         return None
     return left, top, right - left, bottom - top
+
+
+def _rests(hand: Hand, anchor: Hand) -> bool:
+    """Whether a hand is where and as large as it was, but for the jitter of a palm's circle."""
+    away = math.hypot(hand.x - anchor.x, hand.y - anchor.y)
+    same = abs(hand.radius - anchor.radius) < 0.15 * anchor.radius
+    return hand.arm == anchor.arm and same and away < 0.4 * anchor.radius
 
 
 def _inside(hand: Hand, part: Box, whole: Box) -> bool:

@@ -69,6 +69,9 @@ class Near(NamedTuple):
     """m; negative when they overlap"""
     points: tuple[Point, Point]
     """m, base frame: the nearest points, on the link and on the thing"""
+    joints: tuple[int, int]
+    """From which joint on, counted from 0, up to which, not included: no other joint changes the
+    distance"""
 
 
 class Proximity(Protocol):

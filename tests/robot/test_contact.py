@@ -7,7 +7,7 @@ import pybullet
 import pytest
 
 from app.config import ArmMotionSettings, ClearanceSettings
-from app.link.actions import Gripper, JogCartesian, JogJoint
+from app.link.actions import Gripper, JogCartesian, JogJoint, MoveLinear
 from app.robot.arm import Contact
 from app.robot.contact import ContactWatch
 from app.robot.controller import Controller
@@ -80,11 +80,7 @@ def real() -> Iterator[Real]:
 def test_a_cube_is_picked_from_the_table_and_set_down_again(real: Real) -> None:
     real.ready()
     # Over the cube: down it goes at (0.55, 0.10), tool 20 mm above the table.
-    for number, (axis, way) in enumerate([(0, 0.05), (1, 0.10)], start=1):
-        linear = [0.0, 0.0, 0.0]
-        linear[axis] = 0.1
-        real.show(JogCartesian(linear=tuple(linear)), number, way / 0.1 + 0.03)
-        real.show(None, number, 0.4)
+    real.until(MoveLinear(offset=(0.05, 0.10, 0.0)), 1)
     tool = real.state.tool_position
     assert tool[:2] == pytest.approx((0.55, 0.10), abs=0.01)
     real.until(JogCartesian(linear=(0.0, 0.0, -0.15)), 3)
@@ -93,7 +89,7 @@ def test_a_cube_is_picked_from_the_table_and_set_down_again(real: Real) -> None:
     )
     real.until(Gripper(width=0.0), 4)
     assert real.controller.reading.held == "red_cube"
-    real.show(JogCartesian(linear=(0.0, 0.0, 0.15)), 5, 1.2)
+    real.show(JogCartesian(linear=(0.0, 0.0, 0.15)), 5, 1.7)
     real.show(None, 5, 0.4)
     cube = {thing.name: thing for thing in real.state.objects}["red_cube"]
     assert cube.position[2] > 0.50
@@ -102,7 +98,7 @@ def test_a_cube_is_picked_from_the_table_and_set_down_again(real: Real) -> None:
     assert 0.4225 < cube.position[2] < 0.4275  # 2 mm over the table, and not pressed on it
     real.until(Gripper(width=0.08), 7)
     assert real.controller.reading.held is None
-    real.show(JogCartesian(linear=(0.0, 0.0, 0.15)), 8, 1.0)
+    real.show(JogCartesian(linear=(0.0, 0.0, 0.15)), 8, 1.5)
     real.show(None, 8, 0.4)
     assert real.state.tool_position[2] > 0.5
     assert (real.state.mode, real.state.fault) == ("armed", None)

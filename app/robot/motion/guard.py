@@ -61,6 +61,8 @@ class Margin(NamedTuple):
     """m; at which the arm stops"""
     slow: float
     """m; from which it is slowed"""
+    joints: slice
+    """Those that change the distance."""
 
     @property
     def pair(self) -> tuple[str, str]:
@@ -149,13 +151,30 @@ class Guard:
         Negative when something is; ``extra`` (m) is added to every stop distance, but where the
         arm is nearer already.
         """
+        return min(
+            [self._unseen - extra, *(each.distance - self._needed(each, extra) for each in margins)]
+        )
+
+    @property
+    def _unseen(self) -> float:
+        """How far (m) what is not within slowing distance is from where it stops the arm."""
         settings = self._settings
         unseen = settings.slow - max(self._stops.values()) - _RESERVE
         if self._workspace is not None:
             unseen = min(unseen, settings.slow_workspace - _RESERVE)
-        return min(
-            [unseen - extra, *(each.distance - self._needed(each, extra) for each in margins)]
-        )
+        return unseen
+
+    def _stride(self, margins: list[Margin], travels: Vector) -> float:
+        """The part of a braking path that may be passed before looking again, 0 to 1 and more.
+
+        ``travels`` (m, shape (n,)) is how far any point may travel by each joint on all of it. Two
+        links come no nearer by a joint that moves both.
+        """
+        parts = [max(self._unseen, _STRIDE) / float(travels.sum())]
+        for each in margins:
+            if (travel := float(travels[each.joints].sum())) > _SETTLED:
+                parts.append(max(each.distance - self._needed(each), _STRIDE) / travel)
+        return min(parts)
 
     def allows(self, trajectory: JointTrajectory) -> bool:
         """Whether the step that ``trajectory`` has just taken may stand.
@@ -166,16 +185,17 @@ class Guard:
         if self._too_near(here):
             return False
         before = {margin.pair: margin.distance for margin in here}
-        room, part, why = self.room(here), 1.0, ""
+        there, part, why = here, 1.0, ""
         profile = trajectory.braking()
         duration = profile.duration
         end = np.array(profile.at_time(duration)[0])
-        travel = float(np.abs(end - trajectory.position) @ self.reach)
+        travels = np.abs(end - trajectory.position) * self.reach
+        travel = float(travels.sum())
         done = 0.0 if travel > _SETTLED else 1.0
         looks = 0
         while done < 1.0:
             looks += 1
-            step = max(room, _STRIDE) / travel
+            step = self._stride(there, travels)
             if looks == _LOOKS and done + step < 1.0:
                 part, why = self.scale * _CALM, "slowed: close to many things"
                 step = 1.0
@@ -185,12 +205,11 @@ class Guard:
             there = self.margins(np.array(profile.at_time(at)[0]))
             if self._too_near(there):
                 return False
-            room = self.room(there)
             for margin in there:
                 left = self._left(margin, before, travel)
                 if left < part:
                     part, why = left, f"slowed: {self._tell(margin)}"
-        if travel > _SETTLED and room < _STRIDE:
+        if travel > _SETTLED and self.room(there) < _STRIDE:
             hard = trajectory.braking(hard=True)
             if self._too_near(self.margins(np.array(hard.at_time(hard.duration)[0]))):
                 return False
@@ -227,7 +246,9 @@ class Guard:
         if self._proximity is not None:
             nears = self._proximity.near(joints, slow)
             found = [
-                Margin(n.kind, n.link, n.thing, n.distance, self._stops[n.kind], slow)
+                Margin(
+                    n.kind, n.link, n.thing, n.distance, self._stops[n.kind], slow, slice(*n.joints)
+                )
                 for n in nears
             ]
             if nears:
@@ -254,7 +275,8 @@ class Guard:
                 distance = edge[axis] - at if side else at - edge[axis]
                 if distance < slow:
                     name = f"{'xyz'[axis]} {'upper' if side else 'lower'}"
-                    found.append(Margin("workspace", "tool", name, distance, 0.0, slow))
+                    every = slice(None)
+                    found.append(Margin("workspace", "tool", name, distance, 0.0, slow, every))
         return found
 
     def _needed(self, margin: Margin, extra: float = 0.0) -> float:

@@ -133,14 +133,17 @@ class SimulatedProximity:
                 if link in self._still or (movable and link in hand):
                     continue
                 kind: NearKind = "hand" if link in hand else "scene"
-                _keep(found, Near(kind, self._names[link], name, point[8], (point[5], point[6])))
+                points, moves = (point[5], point[6]), (0, self._depths[link])
+                _keep(found, Near(kind, self._names[link], name, point[8], points, moves))
         for first, second in self._around_pairs:
             for point in pybullet.getClosestPoints(
                 body, body, within, first, second, physicsClientId=client
             ):
                 on_first, on_second = point[5:7] if point[3] == first else point[6:4:-1]
                 link, other = self._names[second], self._names[first]
-                _keep(found, Near("itself", link, other, point[8], (on_second, on_first)))
+                between = sorted((self._depths[first], self._depths[second]))
+                moves = between[0], between[1]
+                _keep(found, Near("itself", link, other, point[8], (on_second, on_first), moves))
         if held is not None and self._held is not None:
             self._carry(held)
             for thing, name in self._things.items():
@@ -149,12 +152,14 @@ class SimulatedProximity:
                         held, thing, within, physicsClientId=client
                     ):
                         points = point[5], point[6]
-                        _keep(found, Near("held", self._held, name, point[8], points))
+                        moves = 0, self._depths[self._palm]
+                        _keep(found, Near("held", self._held, name, point[8], points, moves))
             for point in pybullet.getClosestPoints(held, body, within, physicsClientId=client):
                 # Not the hand that holds it, nor the joint that carries the hand.
                 if self._depths[point[4]] < self._depths[self._palm] - 1:
                     points, other = (point[5], point[6]), self._names[point[4]]
-                    _keep(found, Near("itself", self._held, other, point[8], points))
+                    moves = self._depths[point[4]], self._depths[self._palm]
+                    _keep(found, Near("itself", self._held, other, point[8], points, moves))
         return list(found.values())
 
     def close(self) -> None:

@@ -291,28 +291,3 @@ def test_a_joint_whose_limits_leave_out_zero_may_move_slowly() -> None:
     trajectory = JointTrajectory(panda_limits(), start, DT)
     velocity = np.array([1e-4, 0.0, 2e-4, 3.506833247261309e-10, 1e-4, 1e-10, 3e-4])
     assert trajectory.accept(start + velocity * DT, velocity)
-
-
-def test_just_before_a_target_there_is_always_a_way_on() -> None:
-    """A state near the target for which ruckig finds no profile with all joints at one moment."""
-    target = np.array([0, -0.3184, 0, -1.6446, 0, 1.3261, 0.7854])
-    trajectory = JointTrajectory(panda_limits(), target, DT)
-    trajectory.position = np.array(
-        [
-            0.000234889944643809, -0.318400081511489, 2.199295678951451e-07, -1.644601110563538,
-            9.995577919626292e-08, 1.326099987557007, 0.7850904148130302,
-        ]
-    )  # fmt: skip
-    trajectory.velocity = np.array(
-        [
-            -0.03959379448569393, 4.60527543409043e-06, -1.255096179928647e-05,
-            6.387424351265812e-05, -5.616788867080128e-06, 6.991627675824076e-07,
-            0.04955080370620808,
-        ]
-    )  # fmt: skip
-    trajectory.acceleration = np.array([4.449370432190038, 0, 0, 0, 0, 0, -3.865835841748358])
-    for _ in range(100):
-        if trajectory.follow_target(target):
-            break
-    assert trajectory.at_rest
-    assert trajectory.position.tolist() == target.tolist()

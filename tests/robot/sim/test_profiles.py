@@ -103,7 +103,7 @@ def test_straight_jogs_are_straight(rig: Rig) -> None:
         rig.wait(0.1)
         start = rig.controller.reading.tool
         jog = JogCartesian(linear=tuple(linear))
-        way = rig.show(jog, 0.8).tool.position - start.position
+        way = rig.show(jog, 1.3).tool.position - start.position
         along = np.array(linear) / 0.1
         assert way @ along > 0.05
         assert np.linalg.norm(way - (way @ along) * along) < 1e-3
@@ -131,7 +131,7 @@ def test_the_gripper_picks_a_cube_up(rig: Rig) -> None:
     rig.wait(0.5)
     rig.show(Gripper(width=0.0), 5.0)
     rig.wait(0.3)
-    rig.show(JogCartesian(linear=(0, 0, 0.1)), 2.0)
+    rig.show(JogCartesian(linear=(0, 0, 0.1)), 2.5)
     rig.wait(0.5)
     held = {thing.name: thing for thing in rig.controller.reading.objects}["red_cube"]
     assert held.position[2] > cube.position[2] + 0.1
@@ -184,7 +184,7 @@ def test_a_robot_of_ones_own_moves_and_is_drawn_in_its_colours(tmp_path: Path) -
     rig = Rig(path)
     reading = rig.show(TurnJoint(joint=2, angle=0.2), 10.0)
     assert reading.joints == pytest.approx(np.array([0.0, 0.3]), abs=1e-3)
-    assert rig.show(JogJoint(joint=1, velocity=1.0), 0.5).velocities[0] > 0.9
+    assert rig.show(JogJoint(joint=1, velocity=1.0), 0.7).velocities[0] > 0.9
     assert rig.stop("S1") <= 0.2
     rig.arm.close()
     renderer = Renderer(path, hardware=False)
