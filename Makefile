@@ -11,8 +11,8 @@ help:            ## say what there is
 run: $(SETUP)    ## start the server and a robot; prints the link to open
 	$(BIN)/python -m app serve --data-dir .farhand $(ARGS)
 
-test: $(SETUP)   ## run all tests
-	$(BIN)/python -m pytest $(ARGS)
+test: $(SETUP)   ## run all tests, two at once
+	$(BIN)/python -m pytest -n 2 --dist loadgroup $(ARGS)
 
 check: $(SETUP)  ## linters, types and import borders
 	$(BIN)/ruff check

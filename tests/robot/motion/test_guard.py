@@ -272,4 +272,5 @@ def test_no_distance_is_ever_broken_whatever_is_asked(
 
 
 def test_margin_names_its_pair() -> None:
-    assert Margin("scene", "link3", "table", 0.05, 0.02, 0.1).pair == ("link3", "table")
+    margin = Margin("scene", "link3", "table", 0.05, 0.02, 0.1, slice(0, 3))
+    assert margin.pair == ("link3", "table")
