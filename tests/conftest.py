@@ -20,10 +20,8 @@ LIVE = (
 share a machine of two cores."""
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    for item in items:
-        name = item.path.relative_to(TESTS).as_posix()
-        live = name in LIVE or name.partition("/")[0] in LIVE
-        # Other files each stay whole, for what their tests share.
-        item.add_marker(pytest.mark.xdist_group("live" if live else name))
+def pytest_itemcollected(item: pytest.Item) -> None:
+    name = item.path.relative_to(TESTS).as_posix()
+    live = name in LIVE or name.partition("/")[0] in LIVE
+    # Other files each stay whole, for what their tests share.
+    item.add_marker(pytest.mark.xdist_group("live" if live else name))
