@@ -192,8 +192,9 @@ class GestureDriver:
             runs_on = abs(float(end[axis] - seen[axis]))
             self.runs_on[speed] += LEARNS * (runs_on - self.runs_on[speed])
         self.showings.append(Showing(gesture, began, rested, self._since, let_go, stood, way))
-        if self._since is None:
-            # The sign was not understood: show it a little differently.
+        broken_off = axis is not None and not driving and self.eyes.see().mode == "armed"
+        if self._since is None or broken_off:
+            # The sign was not understood, or not all the time: show it a little differently.
             self.webcam.person = replace(self.webcam.person, seed=self.webcam.person.seed + 1)
 
     def _lets_go(self, rested: float, enough: Callable[[], bool], longest: float) -> bool:

@@ -54,9 +54,9 @@ class FindHand:
         self._contrast = self._sure = 0.0
         self.way = Way("threshold", "")
 
-    def __call__(self, pixels: U8, watch: Stopwatch) -> Palm:
-        """Find the hand in (h, w, 3) BGR or (h, w, 1) grey."""
-        self.way = self._choose(pixels)
+    def __call__(self, pixels: U8, watch: Stopwatch, *, held: bool = False) -> Palm:
+        """Find the hand in (h, w, 3) BGR or (h, w, 1) grey; ``held``: it holds a gesture."""
+        self.way = self._choose(pixels, held=held)
         watch.lap("choose")
         if self.way.mode == "learned":
             return self._by_network(pixels, watch)

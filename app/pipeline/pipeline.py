@@ -73,7 +73,8 @@ class Pipeline:
         watch = Stopwatch(dict.fromkeys((*STAGES, "total"), 0.0))
         frame = self._decode(jpeg)
         watch.lap("decode")
-        palm = self._find_hand(frame.pixels, watch)
+        held = self._agree.gesture is not None
+        palm = self._find_hand(frame.pixels, watch, held=held)
         motion = self._gate(palm.piece, now)
         watch.lap("motion")
 
@@ -89,7 +90,6 @@ class Pipeline:
             watch.lap("roi")
             if box is None:
                 reason = "no hand in the picture: nothing is left above the wrist"
-        held = self._agree.gesture is not None
         looked_at = motion.still or motion.trembling or (held and motion.nearly_still)
         if reason is None and motion.fraction is None:
             reason = "waiting for three frames"
