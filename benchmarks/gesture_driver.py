@@ -5,7 +5,6 @@ The eyes are the robot's published state over REST, as late as a person's; the h
 """
 
 import threading
-import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -17,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.link.messages import State
-from benchmarks.live_webcam import LiveWebcam
+from benchmarks.live_webcam import Clock, LiveWebcam
 
 F64 = NDArray[np.float64]
 REACTION_S = 0.2
@@ -48,12 +47,30 @@ class CannotDrive(RuntimeError):
 
 
 class Eyes:
-    """The robot's newest states, read over REST. A context manager."""
+    """What has been seen of the robot, and when."""
+
+    def __init__(self, clock: Clock) -> None:
+        self.clock = clock
+        self.seen: deque[tuple[float, State]] = deque(maxlen=100)
+
+    def now(self) -> State:
+        """The newest state; for what measures, and for who has looked long enough."""
+        return self.seen[-1][1]
+
+    def see(self, ago: float = REACTION_S) -> State:
+        """The state as a person acts on it now: ``ago`` s old."""
+        before = self.clock.now() - ago
+        old = [state for at, state in list(self.seen) if at <= before]
+        return old[-1] if old else self.seen[0][1]
+
+
+class RemoteEyes(Eyes):
+    """Reads the states over REST. A context manager."""
 
     def __init__(self, api: httpx.Client, robot: str = "puma") -> None:
+        super().__init__(Clock())
         self._api = api
         self._path = f"/api/robots/{robot}"
-        self._seen: deque[tuple[float, State]] = deque(maxlen=100)
         self._over = threading.Event()
         self._first = threading.Event()
         self._thread = threading.Thread(target=self._look, name="eyes", daemon=True)
@@ -73,16 +90,6 @@ class Eyes:
         self._over.set()
         self._thread.join(20)
 
-    def now(self) -> State:
-        """The newest state; what measures uses this."""
-        return self._seen[-1][1]
-
-    def see(self, ago: float = REACTION_S) -> State:
-        """The state as a person acts on it now: ``ago`` s old."""
-        before = time.monotonic() - ago
-        old = [state for at, state in list(self._seen) if at <= before]
-        return old[-1] if old else self._seen[0][1]
-
     def _look(self) -> None:
         while not self._over.wait(LOOK_S):
             try:
@@ -91,7 +98,7 @@ class Eyes:
                 return  # the server is gone, and so is the robot
             if answer["state"] is not None:
                 state = State.model_validate(answer["state"] | {"fault": answer["fault"]})
-                self._seen.append((time.monotonic(), state))
+                self.seen.append((self.clock.now(), state))
                 self._first.set()
 
 
@@ -132,6 +139,11 @@ class GestureDriver:
     _gives_up: float | None = None
     _since: float | None = None
     """Since when the robot has been seen moving in this showing."""
+
+    @property
+    def clock(self) -> Clock:
+        """The hand's."""
+        return self.webcam.clock
 
     def to(self, axis: int, target: float, within: float) -> float:
         """Bring one coordinate of the tool to ``target``, in one showing or more.
@@ -174,17 +186,17 @@ class GestureDriver:
         """Raise the hand, hold it until it was enough, lower it, wait until the robot stands."""
         self._ready()
         self._since = None
-        began, start = time.monotonic(), _tool(self.eyes.now())
+        began, start = self.clock.now(), _tool(self.eyes.now())
         rested = self.webcam.raise_hand(gesture)
         while not self._lets_go(rested, enough, longest):
-            time.sleep(0.01)
+            self.clock.sleep(0.01)
         speed, driving = self._speed(), self.eyes.now().mode == "moving"
         seen = _tool(self.eyes.see())
         self.webcam.lower_hand(wait=False)
-        let_go = time.monotonic()
-        while self.eyes.now().mode == "moving" and time.monotonic() - let_go < 5:
-            time.sleep(0.01)
-        stood = time.monotonic()
+        let_go = self.clock.now()
+        while self.eyes.now().mode == "moving" and self.clock.now() - let_go < 5:
+            self.clock.sleep(0.01)
+        stood = self.clock.now()
         self.webcam.lower_hand()
         end = _tool(self.eyes.now())
         way = 0.0 if axis is None else float(end[axis] - start[axis])
@@ -192,13 +204,14 @@ class GestureDriver:
             runs_on = abs(float(end[axis] - seen[axis]))
             self.runs_on[speed] += LEARNS * (runs_on - self.runs_on[speed])
         self.showings.append(Showing(gesture, began, rested, self._since, let_go, stood, way))
-        if self._since is None:
-            # The sign was not understood: show it a little differently.
+        broken_off = axis is not None and not driving and self.eyes.see().mode == "armed"
+        if self._since is None or broken_off:
+            # The sign was not understood, or not all the time: show it a little differently.
             self.webcam.person = replace(self.webcam.person, seed=self.webcam.person.seed + 1)
 
     def _lets_go(self, rested: float, enough: Callable[[], bool], longest: float) -> bool:
         """Whether to lower the hand now, which has been held still since ``rested``."""
-        now, mode = time.monotonic(), self.eyes.now().mode
+        now, mode = self.clock.now(), self.eyes.now().mode
         if self._since is None:
             if mode == "moving":
                 self._since = now
@@ -211,19 +224,19 @@ class GestureDriver:
     def _speed(self) -> str:
         """How fast the tool goes now, as far as a person tells by the time it has gone."""
         since = self._since
-        return "full" if since is not None and time.monotonic() - since > CRAWLS_S else "crawl"
+        return "full" if since is not None and self.clock.now() - since > CRAWLS_S else "crawl"
 
     def _ready(self) -> None:
         """Wait, with the hand down, until the robot may move again."""
         if self._gives_up is None:
-            self._gives_up = time.monotonic() + self.patience_s
-        if time.monotonic() > self._gives_up:
+            self._gives_up = self.clock.now() + self.patience_s
+        if self.clock.now() > self._gives_up:
             raise CannotDrive(f"not done within {self.patience_s:.0f} s")
-        deadline = time.monotonic() + 10
+        deadline = self.clock.now() + 10
         while (state := self.eyes.now()).mode != "armed":
-            if state.mode in ("stopped", "faulted") or time.monotonic() > deadline:
+            if state.mode in ("stopped", "faulted") or self.clock.now() > deadline:
                 raise CannotDrive(f"the robot is {state.mode}: {state.fault or state.reason}")
-            time.sleep(0.01)
+            self.clock.sleep(0.01)
 
     def _blocked(self) -> bool:
         """Something keeps the tool from going on: it did what was shown, and came nowhere."""

@@ -10,7 +10,7 @@ camera that reads out row by row.
 import os
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import count
 from pathlib import Path
 from types import TracebackType
@@ -31,6 +31,20 @@ _DESK = 1.5 * HEIGHT
 _FORMING = 5
 """The sign is formed in so many steps, in the first half of the way up."""
 _SHAKE_S = 20
+_LOOK_S = 0.005
+_HEAD = f"YUV4MPEG2 W{WIDTH} H{HEIGHT} F{FPS}:1 Ip A1:1 C420jpeg\nFRAME\n".encode()
+
+
+class Clock:
+    """The time of day's; :mod:`benchmarks.virtual_drive` has another."""
+
+    def now(self) -> float:
+        """Seconds, monotonic."""
+        return time.monotonic()
+
+    def sleep(self, seconds: float) -> None:
+        """Let time pass."""
+        time.sleep(seconds)
 
 
 class LiveWebcam:
@@ -38,15 +52,24 @@ class LiveWebcam:
 
     Args:
         path: The file that Chromium reads; written at once, so that a browser may be started.
+            None: there is no browser, and somebody else takes the pictures.
         seed: Of the person (size, place, skin, the shape of each sign), the wall, and the tremor.
         tremor_px: Standard deviation of the trembling of a hand at rest, pixels.
+        clock: By which the hand moves.
 
     Attributes:
         person: Whose hand it is; may be replaced, when the same person shows a sign another way.
     """
 
-    def __init__(self, path: Path, seed: int = 0, tremor_px: float = 0.35) -> None:
+    def __init__(
+        self,
+        path: Path | None,
+        seed: int = 0,
+        tremor_px: float = 0.35,
+        clock: Clock | None = None,
+    ) -> None:
         self.path = path
+        self.clock = clock or Clock()
         self._generator = np.random.default_rng(seed)
         self.person = Drawn.of(self._generator)
         self._studio = Studio(self._generator, plain_room(self._generator), FPS)
@@ -55,15 +78,12 @@ class LiveWebcam:
         self._wanted: str | None = None
         self._rests_since: float | None = None
         self._gone = True
+        self.pictures = self._frames()
+        """What the webcam sees, without end; 30 are to be taken a second."""
         self._over = threading.Event()
-        self._changed = threading.Condition()
         self._thread = threading.Thread(target=self._play, name="webcam", daemon=True)
-        head = f"YUV4MPEG2 W{WIDTH} H{HEIGHT} F{FPS}:1 Ip A1:1 C420jpeg\nFRAME\n".encode()
-        self._at = len(head)
-        path.write_bytes(head + _planes(self._studio.shoot()))
-        self._file = os.open(path, os.O_WRONLY)
-        self.late = 0
-        """Frames that came over a frame's time late."""
+        if path is not None:
+            path.write_bytes(_HEAD + _planes(self._studio.shoot()))
 
     def __enter__(self) -> Self:
         self._thread.start()
@@ -77,7 +97,6 @@ class LiveWebcam:
     ) -> None:
         self._over.set()
         self._thread.join(10)
-        os.close(self._file)
 
     def practise(self, *names: str) -> None:
         """Draw the hands of these gestures beforehand, so that none is drawn while it plays."""
@@ -94,11 +113,9 @@ class LiveWebcam:
             TimeoutError: the picture is not live.
         """
         self._wanted = gesture
-        with self._changed:
-            if not self._changed.wait_for(lambda: self._rests_since is not None, 10):
-                raise TimeoutError("the hand did not come to rest: is the webcam running?")
-            assert self._rests_since is not None
-            return self._rests_since
+        self._wait_until(lambda: self._rests_since is not None)
+        assert self._rests_since is not None
+        return self._rests_since
 
     def lower_hand(self, *, wait: bool = True) -> None:
         """Take the hand out of view.
@@ -107,9 +124,15 @@ class LiveWebcam:
             TimeoutError: the picture is not live.
         """
         self._wanted = None
-        with self._changed:
-            if wait and not self._changed.wait_for(lambda: self._gone, 10):
-                raise TimeoutError("the hand did not go: is the webcam running?")
+        if wait:
+            self._wait_until(lambda: self._gone)
+
+    def _wait_until(self, done: Callable[[], bool]) -> None:
+        gives_up = self.clock.now() + 30
+        while not done():
+            if self.clock.now() > gives_up:
+                raise TimeoutError("the hand does not move: are the pictures taken?")
+            self.clock.sleep(_LOOK_S)
 
     def _way(self, name: str) -> list[Cutout]:
         """The hand on its way from relaxed to the sign, which is the last of them."""
@@ -130,46 +153,39 @@ class LiveWebcam:
             if name is None:
                 yield shoot()
                 continue
-            self._tell(gone=False)
+            self._gone = False
             way = self._way(name)
-            for share in _travel():
+            for share in self._travel():
                 hand = way[min(int(2 * share * _FORMING), _FORMING - 1)]
                 yield shoot((hand, (0.0, _DESK * (1 - share))))
             for number in count():
                 yield shoot((way[-1], self._shakes[number % len(self._shakes)]))
                 if number == 0:
-                    self._tell(rests_since=time.monotonic())
+                    self._rests_since = self.clock.now()
                 if self._wanted != name:
                     break
-            self._tell()
-            for share in _travel():
+            self._rests_since = None
+            for share in self._travel():
                 yield shoot((way[-1], (0.0, _DESK * share)))
             yield shoot()
-            self._tell(gone=True)
+            self._gone = True
 
-    def _tell(self, *, gone: bool = False, rests_since: float | None = None) -> None:
-        with self._changed:
-            self._gone, self._rests_since = gone, rests_since
-            self._changed.notify_all()
+    def _travel(self) -> Iterator[float]:
+        """Shares of a way, with minimum jerk (Flash and Hogan 1985), by the clock."""
+        began = self.clock.now()
+        while (t := (self.clock.now() - began) / RAISE_S) < 1:
+            yield 10 * t**3 - 15 * t**4 + 6 * t**5
 
     def _play(self) -> None:
+        assert self.path is not None
+        file = os.open(self.path, os.O_WRONLY)
         due = time.monotonic()
-        for picture in self._frames():
-            os.pwrite(self._file, _planes(picture), self._at)
-            due += 1 / FPS
-            late = time.monotonic() - due
-            if late > 1 / FPS:
-                self.late += 1
-                due += late
-            if self._over.wait(max(0.0, -late)):
-                return
-
-
-def _travel() -> Iterator[float]:
-    """Shares of a way, with minimum jerk (Flash and Hogan 1985), by the clock."""
-    began = time.monotonic()
-    while (t := (time.monotonic() - began) / RAISE_S) < 1:
-        yield 10 * t**3 - 15 * t**4 + 6 * t**5
+        for picture in self.pictures:
+            os.pwrite(file, _planes(picture), len(_HEAD))
+            due = max(due + 1 / FPS, time.monotonic() - 1 / FPS)
+            if self._over.wait(max(0.0, due - time.monotonic())):
+                break
+        os.close(file)
 
 
 def _planes(picture: U8) -> bytes:

@@ -10,12 +10,15 @@ some millimetres off.
 A run has succeeded when the cube itself lies at rest inside the walls of the tray, and the arm is
 armed, neither stopped nor at fault.
 
-    python -m benchmarks.pick_and_place [--runs 10] [--seed 0] [--pictures FOLDER] [--save FILE]
+With ``--virtual`` the same operator, recognition, decisions and robot run by a virtual clock in one
+process (:mod:`benchmarks.virtual_drive`): what does not depend on the machine's load, to the mm.
+
+    python -m benchmarks.pick_and_place [--runs 10] [--seed 0] [--virtual [--crawl 1]]
+                                        [--pictures FOLDER] [--save FILE]
 """
 
 import os
 import tempfile
-import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -26,12 +29,14 @@ import numpy as np
 from numpy.typing import NDArray
 from playwright.sync_api import Page
 
+from app.config import ArmMotionSettings
 from app.link.messages import State
 from app.robot.models import model_assets
 from benchmarks.driving import browser
-from benchmarks.gesture_driver import CannotDrive, Eyes, GestureDriver, Showing
+from benchmarks.gesture_driver import CannotDrive, Eyes, GestureDriver, RemoteEyes, Showing
 from benchmarks.live_webcam import LiveWebcam
 from benchmarks.report import arguments, percentiles, report
+from benchmarks.virtual_drive import VirtualWorld
 from tests.e2e.running import start_server, stop_server
 
 F64 = NDArray[np.float64]
@@ -135,9 +140,9 @@ def pick_and_place(
 
     @contextmanager
     def phase(name: str) -> Iterator[None]:
-        began = time.monotonic()
+        began = eyes.clock.now()
         yield
-        seconds[name] = time.monotonic() - began
+        seconds[name] = eyes.clock.now() - began
         at_phase(name)
 
     with phase("above the cube"):
@@ -165,15 +170,15 @@ def pick_and_place(
 
 def judge(eyes: Eyes) -> str | None:
     """Why it has not succeeded, by the cube's real place; None: it has."""
-    deadline = time.monotonic() + 5
+    deadline = eyes.clock.now() + 5
     before = cube(eyes.now())
     while True:
-        time.sleep(0.5)
+        eyes.clock.sleep(0.5)
         state = eyes.now()
         here = cube(state)
         if np.linalg.norm(here - before) < 0.0005:
             break
-        if time.monotonic() > deadline:
+        if eyes.clock.now() > deadline:
             return "the cube does not come to rest"
         before = here
     if not Tray.of().holds(here):
@@ -183,48 +188,61 @@ def judge(eyes: Eyes) -> str | None:
     return None
 
 
+def attempt(driver: GestureDriver, seed: int, at_phase: Callable[[str], None]) -> Run:
+    """Do it once, however it ends."""
+    run = Run(load=os.getloadavg()[0], showings=driver.showings)
+    misjudged = np.random.default_rng(seed).normal(0.0, MISJUDGED_M, 3)
+    began = driver.clock.now()
+    try:
+        run.phases = pick_and_place(driver, misjudged, at_phase)
+        run.failure = judge(driver.eyes)
+    except CannotDrive as error:
+        run.failure = str(error)
+    run.seconds = driver.clock.now() - began
+    return run
+
+
 def one_run(folder: Path, seed: int, pictures: Path | None = None) -> Run:
     """Start everything, do it once, end everything."""
-    run = Run(load=os.getloadavg()[0])
-    webcam = LiveWebcam(folder / "webcam.y4m", seed)
+    video = folder / "webcam.y4m"
+    webcam = LiveWebcam(video, seed)
     webcam.practise(*GESTURES)
-    misjudged = np.random.default_rng(seed).normal(0.0, MISJUDGED_M, 3)
     server = start_server(folder)
     try:
         with (
             server.api() as api,
-            Eyes(api) as eyes,
+            RemoteEyes(api) as eyes,
             webcam,
-            browser(server, webcam.path) as page,
+            browser(server, video) as page,
         ):
-            driver = GestureDriver(webcam, eyes)
-            began = time.monotonic()
-            try:
-                run.phases = pick_and_place(
-                    driver, misjudged, lambda name: _look(api, page, pictures, seed, name)
-                )
-                run.failure = judge(eyes)
-            except CannotDrive as error:
-                run.failure = str(error)
-            run.seconds = time.monotonic() - began
-            run.showings = driver.showings
-            _look(api, page, pictures, seed, "end")
+
+            def look(name: str) -> None:
+                if pictures is not None:
+                    _keep(api, page, pictures / f"{seed}-{name.replace(' ', '-')}")
+
+            run = attempt(GestureDriver(webcam, eyes), seed, look)
+            look("end")
     finally:
         stop_server(server)
     return run
 
 
-def _look(api: httpx.Client, page: Page, pictures: Path | None, seed: int, name: str) -> None:
+def virtual_run(seed: int, motion: ArmMotionSettings | None = None) -> Run:
+    """Do it once by a virtual clock: no browser, no server, no other process."""
+    world = VirtualWorld(seed, motion=motion)
+    try:
+        return attempt(GestureDriver(world.webcam, world.eyes), seed, lambda name: None)
+    finally:
+        world.close()
+
+
+def _keep(api: httpx.Client, page: Page, stem: Path) -> None:
     """Keep what the robot's cameras show, and the page at the end."""
-    if pictures is None:
-        return
-    stem = f"{seed}-{name.replace(' ', '-')}"
     for camera in ("scene", "wrist"):
-        (pictures / f"{stem}-{camera}.jpg").write_bytes(
-            api.get(f"/api/cameras/{camera}.jpg").content
-        )
-    if name == "end":
-        page.screenshot(path=pictures / f"{stem}-page.png")
+        picture = api.get(f"/api/cameras/{camera}.jpg").content
+        stem.with_name(f"{stem.name}-{camera}.jpg").write_bytes(picture)
+    if stem.name.endswith("end"):
+        page.screenshot(path=stem.with_name(f"{stem.name}-page.png"))
 
 
 def tell(number: int, run: Run) -> None:
@@ -270,13 +288,24 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=10)
     parser.add_argument("--seed", type=int, default=0, help="of the first run's person")
     parser.add_argument("--pictures", type=Path, help="keep the cameras' pictures there")
+    parser.add_argument(
+        "--virtual", action="store_true", help="by a virtual clock, without browser and server"
+    )
+    parser.add_argument(
+        "--crawl", type=float, default=0.25, help="with --virtual: speed a jog begins at; 1: full"
+    )
     options = parser.parse_args()
     if options.pictures is not None:
         options.pictures.mkdir(parents=True, exist_ok=True)
     runs: list[Run] = []
     for number in range(options.runs):
         with tempfile.TemporaryDirectory() as folder:
-            runs.append(one_run(Path(folder), options.seed + number, options.pictures))
+            seed = options.seed + number
+            runs.append(
+                virtual_run(seed, ArmMotionSettings(creep=options.crawl))
+                if options.virtual
+                else one_run(Path(folder), seed, options.pictures)
+            )
         tell(number + 1, runs[-1])
     report(figures_of(runs), options)
     kept = sum(run.kept for run in runs)

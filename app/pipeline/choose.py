@@ -43,12 +43,24 @@ class Choose:
         self._against = 0
         self._proof_in = 0
         self._doubt = 0
+        self._last = Way("learned", "")
         self._found = self._proved = 0
 
-    def __call__(self, pixels: U8) -> Way:
-        """Choose for a (h, w, 3) BGR or (h, w, 1) grey picture, the next of a stream."""
+    def __call__(self, pixels: U8, *, held: bool = False) -> Way:
+        """Choose for a (h, w, 3) BGR or (h, w, 1) grey picture, the next of a stream.
+
+        Args:
+            pixels: The picture.
+            held: A gesture is held: the network's way is then not left for the threshold, whose
+                mask of the same hand may be another gesture's, or none's.
+        """
         if self._fixed != "auto":
             return Way(self._fixed, "the settings say so")
+        if not (held and self._last.mode == "learned"):
+            self._last = self._change(pixels)
+        return self._last
+
+    def _change(self, pixels: U8) -> Way:
         if self._doubt > 0:
             self._doubt -= 1
             return Way("learned", "the background is plain, but the threshold finds other things")
@@ -93,7 +105,8 @@ class Choose:
             self._proved = self._found
             return None
         self._now, self._against, self._doubt = "learned", 0, DOUBT
-        return Way("learned", "the background is plain, but the threshold finds other things")
+        self._last = Way("learned", "the background is plain, but the threshold finds other things")
+        return self._last
 
 
 def plain_part(pixels: U8) -> float:

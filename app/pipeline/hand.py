@@ -67,10 +67,10 @@ class FindHand:
         self.way = Way("threshold", "")
         self.looks = 0
 
-    def __call__(self, pixels: U8, watch: Stopwatch) -> Palm:
-        """Find the hand in (h, w, 3) BGR or (h, w, 1) grey."""
+    def __call__(self, pixels: U8, watch: Stopwatch, *, held: bool = False) -> Palm:
+        """Find the hand in (h, w, 3) BGR or (h, w, 1) grey; ``held``: it holds a gesture."""
         self.looks = 0
-        self.way = self._choose(pixels)
+        self.way = self._choose(pixels, held=held)
         watch.lap("choose")
         if self.way.mode == "learned":
             return self._by_network(pixels, watch)

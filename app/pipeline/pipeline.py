@@ -77,7 +77,8 @@ class Pipeline:
         frame = self._decode(jpeg)
         digest = zlib.crc32(frame.pixels.data)
         watch.lap("decode")
-        palm = self._find_hand(frame.pixels, watch)
+        held = self._agree.gesture is not None
+        palm = self._find_hand(frame.pixels, watch, held=held)
         motion = self._gate(palm.piece, now)
         watch.lap("motion")
 
@@ -99,7 +100,6 @@ class Pipeline:
         elif self._find_hand.two_hands(palm):
             cause, reason = "two_hands", "two hands in the picture: show one"
         watch.lap("alone")
-        held = self._agree.gesture is not None
         looked_at = motion.still or motion.trembling or (held and motion.nearly_still)
         if reason is None and motion.fraction is None:
             cause, reason = "waiting", "waiting for three frames"

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.gesture_driver import Eyes, GestureDriver
+from benchmarks.gesture_driver import GestureDriver, RemoteEyes
 from benchmarks.live_webcam import LiveWebcam
 from benchmarks.pick_and_place import GESTURES, judge, pick_and_place
 from tests.e2e.conftest import OpenPage
@@ -19,10 +19,11 @@ pytestmark = [pytest.mark.e2e, pytest.mark.timeout(400)]
 def test_the_cube_is_put_into_the_tray_by_gestures_alone(
     server: Server, open_page: OpenPage, tmp_path: Path
 ) -> None:
-    webcam = LiveWebcam(tmp_path / "webcam.y4m", seed=1)
+    video = tmp_path / "webcam.y4m"
+    webcam = LiveWebcam(video, seed=1)
     webcam.practise(*GESTURES)
-    page = open_page(server.link, webcam=webcam.path)
-    with webcam, server.api() as api, Eyes(api) as eyes:
+    page = open_page(server.link, webcam=video)
+    with webcam, server.api() as api, RemoteEyes(api) as eyes:
         start_driving(page)
         pick_and_place(GestureDriver(webcam, eyes, patience_s=300), np.zeros(3))
         assert judge(eyes) is None

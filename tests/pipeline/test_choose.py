@@ -139,6 +139,24 @@ def test_a_threshold_that_finds_other_things_is_not_tried_for_a_while():
     assert choose.unproved
 
 
+def test_a_held_gesture_keeps_the_networks_way_and_no_longer():
+    choose, hand = Choose(BinariseSettings()), draw_mask("five")
+    choose(draw("five"))
+    doubted = choose.prove(1 - hand, hand)
+    held = {choose(draw("five"), held=True) for _ in range(DOUBT + 2 * PATIENCE)}
+    assert held == {doubted}
+    later = [choose(draw("five")).mode for _ in range(DOUBT + PATIENCE)]
+    assert later[-1] == "threshold"
+
+
+def test_a_held_gesture_does_not_keep_the_threshold_against_a_proof():
+    choose, hand = Choose(BinariseSettings()), draw_mask("five")
+    choose(draw("five"))
+    assert choose(draw("five"), held=True).mode == "threshold"
+    choose.prove(1 - hand, hand)
+    assert choose(draw("five"), held=True).mode == "learned"
+
+
 def test_an_empty_mask_proves_nothing():
     choose, none = Choose(BinariseSettings()), np.zeros((480, 640), np.uint8)
     choose(draw("five"))
