@@ -12,7 +12,7 @@ run: $(SETUP)    ## start the server and a robot; prints the link to open
 	$(BIN)/python -m app serve --data-dir .farhand $(ARGS)
 
 test: $(SETUP)   ## run all tests, two at once
-	$(BIN)/python -m pytest -n 2 --dist loadgroup $(ARGS)
+	$(BIN)/python -m pytest -n 2 $(ARGS)
 
 check: $(SETUP)  ## linters, types and import borders
 	$(BIN)/ruff check

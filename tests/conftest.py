@@ -1,10 +1,10 @@
 """Which tests may run beside one another."""
 
-from pathlib import Path
+from typing import Any
 
 import pytest
+from xdist.scheduler import LoadScopeScheduling
 
-TESTS = Path(__file__).parent
 LIVE = (
     "e2e",
     "gateway/test_real_robot.py",
@@ -20,8 +20,13 @@ LIVE = (
 share a machine of two cores."""
 
 
-def pytest_itemcollected(item: pytest.Item) -> None:
-    name = item.path.relative_to(TESTS).as_posix()
-    live = name in LIVE or name.partition("/")[0] in LIVE
-    # Other files each stay whole, for what their tests share.
-    item.add_marker(pytest.mark.xdist_group("live" if live else name))
+class _Apart(LoadScopeScheduling):
+    def _split_scope(self, nodeid: str) -> str:
+        name = nodeid.partition("::")[0].removeprefix("tests/")
+        live = name in LIVE or name.partition("/")[0] in LIVE
+        # Other files each stay whole, for what their tests share.
+        return "live" if live else name
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:
+    return _Apart(config, log)
