@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 import pytest
 
 from benchmarks import estop, node_faults, stale_burst
-from benchmarks.observer import STANDSTILL_MS, Observer
+from benchmarks.observer import STANDSTILL_MS, Observer, wait
 from benchmarks.rig import Rig
 from benchmarks.standstill import Outcome, gateway_killed, gateway_stopped, network_blackholed
 from tests.proxy import Proxy
@@ -104,7 +104,7 @@ def test_a_stop_is_latched_and_survives_a_restart_of_everything(rig: Rig) -> Non
 
 def test_the_observer_is_not_blind(rig: Rig) -> None:
     with Observer(rig.server.endpoint()) as observer:
-        assert observer.stands()
+        wait(observer.stands, "the first states")
         with pytest.raises(RuntimeError, match="still moved"):
             moving = observer.state.model_copy(update={"velocities": (1.0,) * 6})
             observer.states[:] = [moving]

@@ -35,7 +35,7 @@ def check_page(page: Page) -> None:
     page.frame_locator("#view-3d iframe").locator("canvas").first.wait_for(timeout=60_000)
     # Stopping is a request that changes something: its origin has to be ours.
     page.keyboard.press("Space")
-    wait_for(page, "window.farhand.robot.mode === 'stopped'")
+    wait_for(page, "window.farhand.robot?.mode === 'stopped'")
 
 
 @pytest.fixture
