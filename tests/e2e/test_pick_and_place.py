@@ -1,5 +1,6 @@
 """Somebody with nothing but gestures, shown live to the browser's webcam, handles an object."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,15 @@ from tests.e2e.running import Server
 from tests.e2e.test_drive import start_driving
 
 # About a minute; benchmarks/pick_and_place.py holds the time against what is asked for.
-pytestmark = [pytest.mark.e2e, pytest.mark.timeout(400)]
+pytestmark = [
+    pytest.mark.e2e,
+    pytest.mark.timeout(400),
+    pytest.mark.skipif(
+        "FARHAND_PICK" not in os.environ,
+        reason="wants a quiet machine for a minute: set FARHAND_PICK=1. "
+        "tests/test_pick_and_place.py does the same by a virtual clock",
+    ),
+]
 
 
 def test_the_cube_is_put_into_the_tray_by_gestures_alone(

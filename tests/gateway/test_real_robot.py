@@ -111,6 +111,8 @@ def test_a_stop_over_rest_is_confirmed_and_latched(ready: Running) -> None:
         operator.send("arm")
         assert operator.next("error")["message"]
     reset = ready.http.post("/api/robots/puma/reset")
+    if reset.status_code == 503:  # a busy machine: the answer came too late; asking again is safe
+        reset = ready.http.post("/api/robots/puma/reset")
     assert reset.status_code == 200, reset.json()
     assert reset.json()["mode"] == "disarmed"
 
