@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.config import PipelineSettings
-from app.pipeline import choose, mask, match
+from app.pipeline import choose, mask, match, palm
 from app.pipeline.features import SHAPE_MODEL, SQUASH
 from app.pipeline.network import load
 from benchmarks.ablation import COLUMNS, STEPS, rows
@@ -53,7 +53,9 @@ def test_the_numbers_are_those_of_the_code() -> None:
         f"reaches {mask.REACH} `r` from the palm away from the arm, {mask.ASIDE} `r`": mask,
         f"and {mask.BEHIND} `r` towards the arm": mask,
         f"at {mask.FINE:g} pixels a palm radius": mask,
-        f"with {mask.FINE_WHOLE:g} pixels a palm radius": mask,
+        f"up to {mask.FARTHEST:g} `r`": mask,
+        f"from {palm.ALMOST} of the largest": palm,
+        f"down to {palm.KEPT} of it": palm,
         f"at least {mask.CELLS} cells": mask,
         f"more than {mask.BESIDE} levels": mask,
         f"{mask.AGAIN} frames have passed, and after {mask.NEW} frames": mask,

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from app.config import MatchSettings
 from app.pipeline.match import Gallery, PcaMatcher
-from app.pipeline.palm import PalmFinder, arm_side
+from app.pipeline.palm import Palm, PalmFinder, arm_side
 from app.pipeline.quality import Finding
-from app.pipeline.types import U8
+from app.pipeline.types import U8, Side
 
 F64 = NDArray[np.float64]
 Level = Literal["likely", "possible"]
@@ -36,10 +36,11 @@ LIKELY, POSSIBLE = 0.9, 0.7
 one enrolled photo in 40% of the cases, and a possible one five times as often."""
 FEW = 4
 """Samples; with fewer more would help."""
-RING = 1.75
-"""Palm radii from the palm's centre, where only stretched fingers are."""
+RINGS = 1.75, 2.1, 2.45
+"""Palm radii from the palm's centre, where only stretched fingers are; the palm's circle may lie
+near the wrist."""
 BUNDLE = 0.95
-"""Palm radii along the ring; wider than one finger."""
+"""Palm radii along a ring; wider than one finger."""
 
 
 class Confusion(NamedTuple):
@@ -200,20 +201,25 @@ def _advice(one: tuple[str, U8], other: tuple[str, U8], level: Level) -> tuple[F
 def fingers_shown(template: U8) -> tuple[int, bool]:
     """Stretched fingers of an (80, 60) template, and whether several are held together.
 
-    Counted where a circle round the palm's centre leaves the background for the hand, the side
-    with the wrist left out. A rough guess, good enough for advice.
+    Counted where circles round the palm's centre leave the background for the hand, the side with
+    the wrist left out; the circle that crosses most counts. A rough guess, good enough for advice.
     """
     palm = PalmFinder()(np.ascontiguousarray(template))
     if not palm.found:
         return 0, False
+    side = arm_side(palm.piece, 0.25 * palm.radius)
+    return max((_crossed(palm, side, ring) for ring in RINGS), key=lambda seen: seen[0])
+
+
+def _crossed(palm: Palm, side: Side | None, ring: float) -> tuple[int, bool]:
+    """Fingers that a circle of ``ring`` palm radii crosses, and whether one is as wide as two."""
     angles = np.arange(360) * (np.pi / 180)
-    columns = np.rint(palm.x + RING * palm.radius * np.cos(angles)).astype(int)
-    rows = np.rint(palm.y + RING * palm.radius * np.sin(angles)).astype(int)
+    columns = np.rint(palm.x + ring * palm.radius * np.cos(angles)).astype(int)
+    rows = np.rint(palm.y + ring * palm.radius * np.sin(angles)).astype(int)
     height, width = palm.piece.shape
     inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
     on = np.zeros(360, np.uint8)
     on[inside] = palm.piece[rows[inside], columns[inside]]
-    side = arm_side(palm.piece, 0.25 * palm.radius)
     middle = {"right": 0, "bottom": 90, "left": 180, "top": 270}.get(side or "")
     if middle is not None:
         on[np.arange(middle - 45, middle + 45) % 360] = 0
@@ -221,6 +227,6 @@ def fingers_shown(template: U8) -> tuple[int, bool]:
         return 0, bool(on.any())
     turned = np.roll(on, -int(np.argmin(on)))
     count, _, stats, _ = cv2.connectedComponentsWithStats(turned[None, :])
-    lengths = np.radians(stats[1:count, cv2.CC_STAT_AREA]) * RING
+    lengths = np.radians(stats[1:count, cv2.CC_STAT_AREA]) * ring
     fingers = lengths[lengths > 0.15]
     return len(fingers), bool((fingers > BUNDLE).any())

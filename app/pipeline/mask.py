@@ -28,11 +28,13 @@ REACH = 4.6
 ASIDE, BEHIND = 3.6, 2.6
 """The same to either side, and towards the arm, where it is seen from which side the arm comes:
 what lies beyond is cut off at the wrist, or is another thing."""
-FINE, FINE_WHOLE = 17.0, 24.0
-"""Pixels of a palm's radius, at most, in a look at a part, and in one that follows a hand which
-fills the picture; more makes it no clearer. There, little is seen round the hand, and with less the
-network errs: of webcam crops kept aside 0.95 are told apart at full size, 0.93 at 23, 0.83 at 17.
-"""
+FARTHEST, ROUND = 7.0, 0.6
+"""The same for a piece of the mask that reaches farther than that, as fingers do when the circle
+lies near the wrist; and what is seen beyond its end."""
+FINE = 24.0
+"""Pixels of a palm's radius, at most, in a look that follows; more makes it no clearer. Of whole
+webcam pictures 0.84 are told apart with 24, 0.81 with 20 and 0.78 with 17; of crops round a hand
+0.95 at full size, 0.93 with 23 and 0.83 with 17."""
 AGAIN, NEW = 5, 30
 """Frames after which the whole picture is looked at again although the hand is followed: the first
 when something changed beside it, the second in any case."""
@@ -56,12 +58,22 @@ GROWN = 5.0
 
 
 class Hand(NamedTuple):
-    """Where a look found a palm, in pixels of the picture, and the side its arm comes from."""
+    """Where a look found a palm, in pixels of the picture.
+
+    Attributes:
+        x: Of its centre.
+        y: Of its centre.
+        radius: Of its circle.
+        arm: The side its arm comes from.
+        extent: How far the piece of the mask reaches from the centre to the left, up, to the right
+            and down.
+    """
 
     x: float
     y: float
     radius: float
     arm: Side | None
+    extent: tuple[float, float, float, float]
 
 
 class Masked(NamedTuple):
@@ -89,6 +101,10 @@ class LearnedMask:
         self._anchor: Hand | None = None
         """The hand by which part and fineness were chosen."""
         self._fine = math.inf
+        self._arm: Side = "bottom"
+        """Where the arm comes from, seen in the whole picture: fingers may touch a part's rim."""
+        self._full = False
+        """Whether the part reaches as far as any may."""
         self._around: U8 = np.empty(0, np.uint8)
         self._mask: U8 = np.empty(0, np.uint8)
         self._thumb: U8 = np.empty(0, np.uint8)
@@ -115,44 +131,62 @@ class LearnedMask:
         followed, how_fine = self._part, self._fine
         if followed is not None and self._stale(thumb, followed, whole):
             self._part, self._fine = None, math.inf
-        bounds = self._part or whole
-        share = self._look(pixels, bounds, self._fine)
+        bounds, fine = self._part or whole, self._fine
+        share = self._look(pixels, bounds, fine)
         hand = _palm(share, bounds, whole)
-        if bounds != whole and not (hand and _inside(hand, bounds, whole)):
+        if bounds != whole and not (hand and self._keeps(hand, bounds, whole)):
             bounds = whole
             share = self._look(pixels, bounds)
             hand = _palm(share, bounds, whole)
-        if bounds == whole:
+        if afresh := bounds == whole:
             self._followed, self._around, self.everything = 0, thumb, share
-            part, fine = None, 0.0
-            if hand:
-                part, fine = _part_round(hand, whole, self._worth), FINE / hand.radius
+            part: Box | None = None
             if hand and followed is not None and _inside(hand, followed, whole):
                 # It is still the hand that is followed: looked at from elsewhere, its rim would
                 # change, which looks like motion.
                 part, fine = followed, how_fine
+            elif hand:
+                part, fine = _part_round(hand, whole, self._worth), FINE / hand.radius
+                self._arm, self._full = hand.arm or "bottom", False
             if part is not None:
                 closer = self._look(pixels, part, fine)
-                if (seen := _palm(closer, part, whole)) is not None:
+                seen = _palm(closer, part, whole)
+                if seen and not self._full and _runs_out(seen, part, whole, self._arm):
+                    # Closely seen, it has fingers that the first look had missed.
+                    self._full = True
+                    part = _part_round(seen._replace(arm=self._arm), whole, 1.0, FARTHEST) or part
+                    closer = self._look(pixels, part, fine)
+                    seen = _palm(closer, part, whole)
+                if seen:
                     bounds, share, hand = part, closer, seen
-                    if part == followed:
-                        self._part, self._fine = followed, how_fine
         self._followed += 1
-        self._go_after(hand, bounds, whole)
+        self._go_after(hand, bounds, whole, fine if afresh and bounds != whole else None)
         self._masked = self._spread(share, bounds)
         return self._masked
 
-    def _go_after(self, hand: Hand | None, bounds: Box, whole: Box) -> None:
-        """Choose what the next picture is looked at first: the same, for a hand that rests."""
-        if hand and self._anchor and bounds == (self._part or whole) and _rests(hand, self._anchor):
+    def _go_after(self, hand: Hand | None, bounds: Box, whole: Box, fine: float | None) -> None:
+        """Choose what the next picture is looked at first: the same, for a hand that rests.
+
+        ``fine`` is that of a part which was just chosen from the whole picture: it is kept, so that
+        a stream sees a resting hand as a photograph of it is seen.
+        """
+        rests = hand is not None and self._anchor is not None and _rests(hand, self._anchor)
+        if rests and bounds == (self._part or whole):
             return
-        self._anchor = hand
         self._worth = WORTH_IT
         if hand:
             self._worth += STAYS if bounds != whole else -STAYS
-        self._part = _part_round(hand, whole, self._worth) if hand else None
-        fine = FINE if self._part else FINE_WHOLE
-        self._fine = fine / hand.radius if hand else math.inf
+        if fine is not None:
+            self._part, self._fine = bounds, fine
+        else:
+            self._part = _part_round(hand, whole, self._worth) if hand else None
+            self._fine = FINE / hand.radius if hand else math.inf
+        self._anchor = hand
+
+    def _keeps(self, hand: Hand, part: Box, whole: Box) -> bool:
+        """Whether the part that is followed still shows all of the hand."""
+        runs_out = not self._full and _runs_out(hand, part, whole, self._arm)
+        return _inside(hand, part, whole) and not runs_out
 
     def look_round(self) -> None:
         """Look at the whole of the next picture that is not like this one."""
@@ -223,25 +257,38 @@ def _palm(share: F32, part: Box, whole: Box) -> Hand | None:
     _, radius, _, (column, row) = cv2.minMaxLoc(distance)
     if radius < 1.5:
         return None
-    cv2.floodFill(framed, None, (column, row), 2)
+    *_, box = cv2.floodFill(framed, None, (column, row), 2)
     arm = arm_side((framed[1:-1, 1:-1] == 2).view(np.uint8), MIN_CONTACT * radius)
     x, y, width, height = part
     across, down = width / columns, height / rows
+    left, top = (column - box[0]) * across, (row - box[1]) * down
+    extent = left, top, box[2] * across - left, box[3] * down - top
     return Hand(
-        x + (column - 0.5) * across, y + (row - 0.5) * down, radius * math.sqrt(across * down), arm
+        x + (column - 0.5) * across,
+        y + (row - 0.5) * down,
+        radius * math.sqrt(across * down),
+        arm,
+        extent,
     )
 
 
-def _part_round(hand: Hand, whole: Box, worth: float) -> Box | None:
-    """The part for a second look; None when it is more than ``worth`` of the picture."""
-    far, aside, near = REACH * hand.radius, ASIDE * hand.radius, BEHIND * hand.radius
-    reach = {
-        None: (far, far, far, far),
-        "bottom": (aside, far, aside, near),
-        "top": (aside, near, aside, far),
-        "left": (near, aside, far, aside),
-        "right": (far, aside, near, aside),
-    }[hand.arm]
+_EXTENT: tuple[Side, ...] = ("left", "top", "right", "bottom")
+_OPPOSITE: dict[Side, Side] = {"left": "right", "right": "left", "top": "bottom", "bottom": "top"}
+
+
+def _part_round(hand: Hand, whole: Box, worth: float, least: float = 0.0) -> Box | None:
+    """The part for a second look; None when it is more than ``worth`` of the picture.
+
+    ``least`` palm radii are seen on every side but the arm's.
+    """
+    reach = []
+    for side, seen in zip(_EXTENT, hand.extent, strict=True):
+        if side == hand.arm:
+            radii = BEHIND
+        else:
+            usual = REACH if hand.arm in (None, _OPPOSITE[side]) else ASIDE
+            radii = max(usual, least, min(seen / hand.radius + ROUND, FARTHEST))
+        reach.append(radii * hand.radius)
     left, top = max(0, int(hand.x - reach[0])), max(0, int(hand.y - reach[1]))
     right = min(whole[2], math.ceil(hand.x + reach[2]))
     bottom = min(whole[3], math.ceil(hand.y + reach[3]))
@@ -253,8 +300,24 @@ def _part_round(hand: Hand, whole: Box, worth: float) -> Box | None:
 def _rests(hand: Hand, anchor: Hand) -> bool:
     """Whether a hand is where and as large as it was, but for the jitter of a palm's circle."""
     away = math.hypot(hand.x - anchor.x, hand.y - anchor.y)
-    same = abs(hand.radius - anchor.radius) < 0.15 * anchor.radius
-    return hand.arm == anchor.arm and same and away < 0.4 * anchor.radius
+    return abs(hand.radius - anchor.radius) < 0.15 * anchor.radius and away < 0.4 * anchor.radius
+
+
+def _runs_out(hand: Hand, part: Box, whole: Box, arm: Side) -> bool:
+    """Whether the piece of the mask goes on beyond an inner rim of the part that is not the arm's.
+
+    A rim's outermost 1/40 counts as touched: a look has few pixels more than that.
+    """
+    x, y, width, height = part
+    left, up, right, down = hand.extent
+    near = max(width, height) / 40
+    touched = {
+        "left": x > 0 and hand.x - left <= x + near,
+        "top": y > 0 and hand.y - up <= y + near,
+        "right": x + width < whole[2] and hand.x + right >= x + width - near,
+        "bottom": y + height < whole[3] and hand.y + down >= y + height - near,
+    }
+    return any(is_touched for side, is_touched in touched.items() if side != arm)
 
 
 def _inside(hand: Hand, part: Box, whole: Box) -> bool:

@@ -1,5 +1,6 @@
 """Palm: the largest circle inside the mask, and the piece of the mask it lies in."""
 
+import math
 from typing import NamedTuple
 
 import cv2
@@ -11,6 +12,12 @@ from app.pipeline.types import U8, Box, Side
 SIDES: tuple[Side, ...] = ("bottom", "left", "top", "right")
 MIN_CONTACT = 0.25
 """Palm radii. A piece that touches the picture's border on less has no arm in the picture."""
+ALMOST, KEPT = 0.96, 0.9
+"""In a fist, or a palm and its forearm, two circles may be nearly as large as each other. To and
+fro between them the wrist would be cut here and there; so the one nearer the fingers becomes the
+palm from the first of these parts of the largest, and stays it in a stream down to the second."""
+NEAR = 0.4
+"""Palm radii within which a circle is found again in the next picture."""
 
 
 class Palm(NamedTuple):
@@ -58,10 +65,14 @@ class PalmFinder:
     in the picture. Everything not connected to the palm is dropped.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, towards_fingers: bool = True) -> None:
+        """``towards_fingers``: of circles almost as large, take the one nearest the fingers."""
+        self._towards_fingers = towards_fingers
         self._piece: U8 = np.empty(0, np.uint8)
         self._framed: U8 = np.empty(0, np.uint8)
         self._distance: NDArray[np.float32] = np.empty(0, np.float32)
+        self._last: tuple[int, int, float] | None = None
+        """x, y and radius in the picture before this one."""
 
     def __call__(self, mask: U8, bounds: Box | None = None) -> Palm:
         """Find the palm in a (h, w) mask of 0 and 1.
@@ -75,12 +86,14 @@ class PalmFinder:
             framed = (mask.shape[0] + 2, mask.shape[1] + 2)
             self._framed = np.zeros(framed, np.uint8)
             self._distance = np.empty(framed, np.float32)
+            self._last = None
         piece = self._piece
         np.copyto(self._framed[1:-1, 1:-1], mask)
         cv2.distanceTransform(self._framed, cv2.DIST_L2, 5, dst=self._distance)
         _, radius, _, (x, y) = cv2.minMaxLoc(self._distance)
         if radius <= 0:
             piece.fill(0)
+            self._last = None
             return Palm(piece, 0, 0, 0.0, 0, None)
         x, y = x - 1, y - 1
         np.copyto(piece, mask)
@@ -93,4 +106,44 @@ class PalmFinder:
         arm = arm_side(seen, MIN_CONTACT * radius)
         if arm is None and bounds is not None:
             arm = "bottom"
+        if self._towards_fingers:
+            x, y, radius = self._nearest_fingers(x, y, radius, arm)
         return Palm(piece, x, y, radius, int(area), arm)
+
+    def _nearest_fingers(
+        self, x: int, y: int, most: float, arm: Side | None
+    ) -> tuple[int, int, float]:
+        """x, y and radius of the palm, given the largest circle's; remembered."""
+        distance = self._distance[1:-1, 1:-1]
+        upright = arm in ("bottom", "top", None)
+        plateau = (distance >= ALMOST * most) & (self._piece > 0)
+        lines = np.flatnonzero(plateau.any(axis=1 if upright else 0))
+        # The plateau's end is not its summit, which lies a little farther in.
+        deep = max(1, round(most / 2))
+        if arm in ("top", "left"):
+            part = slice(max(0, int(lines[-1]) - deep), int(lines[-1]) + 1)
+        else:
+            part = slice(int(lines[0]), int(lines[0]) + deep + 1)
+        everything = slice(None)
+        place = self._highest((part, everything) if upright else (everything, part))
+        if self._last is not None:
+            last_x, last_y, radius = self._last
+            reach = math.ceil(NEAR * radius)
+            rows = slice(max(0, last_y - reach), last_y + reach + 1)
+            kept = self._highest((rows, slice(max(0, last_x - reach), last_x + reach + 1)))
+            beyond = {
+                "bottom": place[1] - kept[1],
+                "top": kept[1] - place[1],
+                "left": kept[0] - place[0],
+                "right": place[0] - kept[0],
+            }[arm or "bottom"]
+            if kept[2] >= KEPT * most and beyond > 0:
+                place = kept
+        self._last = place
+        return place
+
+    def _highest(self, part: tuple[slice, slice]) -> tuple[int, int, float]:
+        """x, y and radius of the largest circle of the piece whose centre lies in a part."""
+        inner = self._distance[1:-1, 1:-1][part]
+        _, radius, _, (x, y) = cv2.minMaxLoc(inner, self._piece[part])
+        return x + (part[1].start or 0), y + (part[0].start or 0), radius

@@ -183,7 +183,7 @@ def two_hands(mask: U8, palm: Palm, least: float) -> bool:
     if cv2.countNonZero(rest) < SECOND_AREA * palm.area:
         return False
     away = cv2.distanceTransform(palm.piece ^ 1, cv2.DIST_L2, 5)
-    find = PalmFinder()
+    find = PalmFinder(towards_fingers=False)
     while True:
         second = find(rest)
         if second.radius < least * palm.radius:

@@ -39,11 +39,13 @@ class Views:
         half = settings.features != "binary"
         self.width, self.height = (WIDTH // 2, HEIGHT // 2) if half else (WIDTH, HEIGHT)
         self._canvas: U8 = np.zeros((_CANVAS, _CANVAS), np.uint8)
-        self._find_palm = PalmFinder()
+        self._find_palm = PalmFinder(towards_fingers=False)
 
     def of_template(self, template: U8) -> U8:
         """Views of an (80, 60) template, whose flattest side is taken for the wrist."""
-        palm = self._find_palm(np.ascontiguousarray(template, np.uint8))
+        template = np.ascontiguousarray(template, np.uint8)
+        # All of it: a thumb may hang on a part of the hand that was cut off with the arm.
+        palm = self._find_palm(template)._replace(piece=template)
         cuts = [_trimmed(palm, radii) for radii in self._trims]
         return self._vary(palm, cuts, self._enrolled)
 

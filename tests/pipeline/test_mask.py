@@ -189,6 +189,34 @@ def test_the_part_leaves_out_the_arm_and_keeps_the_fingers():
     assert truth[y + height :].any()
 
 
+@pytest.mark.parametrize("pose", SEEN)
+def test_a_hand_at_rest_is_looked_at_as_a_photograph_of_it_is(pose):
+    pictures = [scene(pose, length=75, centre=(110, 150), noise=noise)[0] for noise in range(8)]
+    photograph = LearnedMask()(pictures[0])
+    find = LearnedMask()
+    for picture in pictures:
+        # Each is looked at: the noise alone would let the last mask stand.
+        find._thumb = np.empty(0, np.uint8)
+        found = find(picture)
+        assert found.bounds == photograph.bounds
+    assert overlap(found.mask, photograph.mask) > 0.93
+
+
+def test_a_part_that_cuts_fingers_off_grows():
+    find = LearnedMask()
+    picture, truth = scene(length=75, centre=(110, 150))
+    find(picture)
+    assert find._part is not None
+    x, y, width, height = find._part
+    top = int(np.flatnonzero(truth.any(axis=1))[0])
+    short = top + 8
+    find._part, find._full = (x, short, width, y + height - short), False
+    find._thumb = np.empty(0, np.uint8)
+    found = find(picture)
+    assert found.bounds[1] <= top
+    assert overlap_inside(found, truth) > 0.75
+
+
 def test_a_hand_that_leaves_is_given_up_and_found_elsewhere():
     find = LearnedMask()
     find(scene(length=75, centre=(110, 150))[0])

@@ -81,6 +81,28 @@ def test_empty_and_full_masks_are_survived(mask):
     assert PalmFinder()(mask).found is bool(mask.any())
 
 
+def two_circles(upper: int, lower: int) -> np.ndarray:
+    """(240, 320) two discs of these radii, one above the other, on an arm from below."""
+    mask = np.zeros((240, 320), np.uint8)
+    cv2.rectangle(mask, (140, 90), (180, 239), 1, -1)
+    cv2.circle(mask, (160, 70), upper, 1, -1)
+    cv2.circle(mask, (160, 160), lower, 1, -1)
+    return mask
+
+
+def test_of_two_circles_almost_as_large_the_one_at_the_fingers_is_the_palm():
+    assert PalmFinder()(two_circles(49, 50)).y == pytest.approx(70, abs=3)
+    assert PalmFinder()(two_circles(40, 50)).y == pytest.approx(160, abs=3)
+    assert PalmFinder(towards_fingers=False)(two_circles(49, 50)).y == pytest.approx(160, abs=3)
+
+
+def test_the_palm_at_the_fingers_is_kept_while_it_is_nearly_as_large():
+    find = PalmFinder()
+    places = [find(two_circles(upper, 50)).y for upper in (50, 46, 50, 46, 40, 46)]
+    # Once it is much smaller it is given up, and does not come back before it is almost as large.
+    assert places == pytest.approx([70, 70, 70, 70, 160, 160], abs=3)
+
+
 def test_hand_without_arm_has_no_side():
     mask = np.zeros((100, 100), np.uint8)
     mask[30:70, 30:70] = 1

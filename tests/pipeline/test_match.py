@@ -167,3 +167,11 @@ def test_shape_features_are_the_distance_ones_and_numbers_of_one_length():
     assert np.array_equal(rows[:, :1200], outlines)
     lengths = np.linalg.norm(rows[:, 1200:], axis=1)
     assert np.allclose(lengths, SETTINGS.shape_weight * np.sqrt(1200), rtol=1e-3)
+
+
+def test_a_thumb_that_was_parted_from_the_hand_counts_as_enrolled():
+    template = np.zeros((80, 60), np.uint8)
+    template[:, 5:40] = 1
+    template[60:, 48:58] = 1
+    views = Views(SETTINGS).of_template(template)
+    assert views[len(SETTINGS.turns) // 2][35, 26] == 1
