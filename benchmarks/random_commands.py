@@ -106,6 +106,7 @@ class Fuzz:
         self._sequence = 0
         self._hold = 0
         self._margins: dict[tuple[str, str], Margin] = {}
+        self._width = self.arm.width
         self._ready()
 
     def close(self) -> None:
@@ -256,11 +257,15 @@ class Fuzz:
         for pair, margin in here.items():
             room = margin.distance - margin.stop
             last = self._margins.get(pair)
+            if margin.kind == "hand" and self.arm.width != self._width:
+                # Fingers that open or close came nearer by themselves: what they may do is a
+                # matter of force (robot/contact.py), and where the arm may carry them of this.
+                last = margin if margin.distance < margin.stop else last
             floor = 0.0 if last is None else min(0.0, last.distance - last.stop)
             if margin.kind in self.least and floor == 0.0:
                 self.least[margin.kind] = min(self.least[margin.kind], room)
             self._check(f"distance ({margin.kind})", floor - room, _ROUNDING, str(margin))
-        self._margins = here
+        self._margins, self._width = here, self.arm.width
 
     def _check(self, what: str, value: float, most: float, detail: str = "") -> None:
         if not value <= most:  # also NaN

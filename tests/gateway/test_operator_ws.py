@@ -493,7 +493,7 @@ def test_a_stop_gesture_counts_although_the_browser_goes_at_once(
         while not seen.wait(0.03):
             operator.frame(hand("stop"))
     try:
-        wait_for(lambda: not server.hub.sessions, "the session to end")
+        wait_for(lambda: not server.hub.people.sessions, "the session to end")
     finally:
         go_on.set()
     wait_for(lambda: node.stops, "the stop")
@@ -552,7 +552,7 @@ def test_too_many_sessions_are_turned_away(node: StandIn, folder: Path) -> None:
                 server.operator()
             assert closed.value.rcvd is not None
             assert closed.value.rcvd.code == 1013
-        wait_for(lambda: not server.hub.sessions, "the session to be over")
+        wait_for(lambda: not server.hub.people.sessions, "the session to be over")
         server.operator().close()
 
 
