@@ -231,7 +231,7 @@ class AgreementSettings(_Section):
         "proportion less",
     )
     max_strangeness: float = Field(
-        default=0.95,
+        default=0.85,
         ge=0.0,
         le=1.0,
         description="a gesture starts only when its frames are in the mean no stranger than this; "
