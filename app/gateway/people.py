@@ -42,7 +42,8 @@ class People:
         most = self._most[role]
         if self._count(role) < most:
             return None
-        return f"{most} {role}s are here already, and no more are let in"
+        here = f"{most} {role}s are" if most != 1 else f"1 {role} is"
+        return f"{here} here already, and no more are let in"
 
     def add(self, session: "OperatorSession") -> None:
         """Somebody came."""

@@ -552,6 +552,7 @@ def test_too_many_sessions_are_turned_away(node: StandIn, folder: Path) -> None:
                 server.operator()
             assert closed.value.rcvd is not None
             assert closed.value.rcvd.code == 1013
+            assert "1 operator is here already" in closed.value.rcvd.reason
         wait_for(lambda: not server.hub.people.sessions, "the session to be over")
         server.operator().close()
 

@@ -12,8 +12,9 @@ export function socketUrl(path) {
 }
 
 /**
- * Events: `state` (detail: {state, retryAt, code, reason}) where state is "closed", "connecting", "open" or
- * "waiting" (for the next try, at `retryAt` on performance.now()); and `message` (detail: data).
+ * Events: `state` (detail: {state, retryAt, code, reason}) where state is "closed", "connecting",
+ * "open" or "waiting" (for the next try, at `retryAt` on performance.now()); and `message` (detail:
+ * data).
  * A socket that says nothing for `silenceMs` counts as dead: a pulled plug sends no close.
  */
 export class ReconnectingSocket extends EventTarget {

@@ -72,6 +72,8 @@ export function goneOverlay(element, store, build) {
             element.hidden = true;
             return;
         }
+        // A new try is no news: what is said stays until something comes of it.
+        if (link.state === "connecting" && shown) return;
         const away = link.reason && link.code === TRY_LATER ? "away" : "gone";
         const kind = link.state === "signed-out" ? "signedOut" : away;
         const show = () => {
