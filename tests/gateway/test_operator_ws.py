@@ -146,9 +146,8 @@ def test_without_control_nothing_is_commanded_and_the_reason_says_so(
         assert frame["reason"] == "nobody has control: take control first"
         with server.operator() as other:
             take_and_arm(other)
-            frame = operator.show(hand("left"))
-            name = other.hello["session"]
-            assert frame["reason"] == f"you do not have control: {name} drives"
+            reason = f"you do not have control: {other.hello['session']} drives"
+            show_until(operator, hand("left"), lambda frame: frame["reason"] == reason)
     assert [command for command in node.commands if command.action] == []
 
 
