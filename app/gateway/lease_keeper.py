@@ -3,6 +3,7 @@
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable
+from typing import Literal
 
 from app.errors import FarhandError, NoControl, RequestError
 from app.gateway.drive import Lease
@@ -12,6 +13,9 @@ from app.link.messages import LeaseReply, LeaseRequest
 log = logging.getLogger(__name__)
 
 RENEW_S = 0.5
+SILENT_S = 2.0
+"""Without a message from the browser for this long control is given back. A link that swallows
+everything closes nothing: the socket alone would say that all is well for many seconds."""
 
 Ask = Callable[[LeaseRequest], Awaitable[LeaseReply]]
 
@@ -32,15 +36,22 @@ class LeaseKeeper:
         holder: The session's name.
         robot: The robot.
         ask: Sends a request from a thread and awaits the answer.
+        silent_s: How long nothing has been heard from whoever holds the lease, s.
         on_lost: Told why the lease is gone, when it was not given back.
     """
 
     def __init__(
-        self, holder: str, robot: RobotPort, ask: Ask, on_lost: Callable[[FarhandError], None]
+        self,
+        holder: str,
+        robot: RobotPort,
+        ask: Ask,
+        silent_s: Callable[[], float],
+        on_lost: Callable[[FarhandError], None],
     ) -> None:
         self._holder = holder
         self._robot = robot
         self._ask = ask
+        self._silent_s = silent_s
         self._on_lost = on_lost
         self._lease: Lease | None = None
         self._renewing: asyncio.Task[None] | None = None
@@ -125,19 +136,24 @@ class LeaseKeeper:
         self._on_lost(NoControl(f"control is lost: {why}", code="control_lost"))
 
     async def _renew(self) -> None:
-        """Say that we are still there, until the lease is gone."""
+        """Say that the holder is still there, until the lease is gone."""
         while True:
             await asyncio.sleep(RENEW_S)
             lease = self.lease
             if lease is None:
                 return
-            request = LeaseRequest(kind="renew", holder=self._holder, epoch=lease.epoch)
+            silent = self._silent_s() >= SILENT_S
+            kind: Literal["renew", "release"] = "release" if silent else "renew"
+            request = LeaseRequest(kind=kind, holder=self._holder, epoch=lease.epoch)
             try:
                 reply = await self._ask(request)
             except FarhandError as error:
                 # The node decides when a lease runs out; it may be back in time.
-                log.info("%s: the lease was not renewed: %s", self._holder, error.message)
+                log.info("%s: the lease: %s failed: %s", self._holder, kind, error.message)
                 continue
+            if silent:
+                self._lose(f"nothing was heard from you for {SILENT_S:g} s")
+                return
             if not reply.granted and self._lease == lease:
                 self._lose(reply.reason or "the robot does not know this lease any more")
                 return

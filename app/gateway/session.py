@@ -87,7 +87,8 @@ class OperatorSession:
         self._worker = FrameWorker(
             self.name, hub.settings, hub.gallery.current, hub.robot, hub.holds
         )
-        self._leases = LeaseKeeper(self.name, hub.robot, hub.ask, self._lease_lost)
+        self._heard_at = time.monotonic()
+        self._leases = LeaseKeeper(self.name, hub.robot, hub.ask, self._silent_s, self.tell)
         self._requests: asyncio.Queue[ClientMessage] = asyncio.Queue(MAX_REQUESTS)
         self._stops: set[asyncio.Task[None]] = set()
         self._slot: FrameJob | None = None
@@ -178,7 +179,8 @@ class OperatorSession:
             message = await self._socket.receive()
             if message["type"] == "websocket.disconnect":
                 return
-            if (wait := pace.wait_s(time.monotonic())) > 0:
+            self._heard_at = time.monotonic()
+            if (wait := pace.wait_s(self._heard_at)) > 0:
                 await asyncio.sleep(wait)
             self._arrivals += 1
             data, text = message.get("bytes"), message.get("text")
@@ -195,6 +197,9 @@ class OperatorSession:
             except RequestError as error:
                 seq = error.detail.get("seq") if data is not None else None
                 self._bad(error, seq, self._arrivals)
+
+    def _silent_s(self) -> float:
+        return time.monotonic() - self._heard_at
 
     def _take_frame(self, message: bytes) -> None:
         """Put a frame into the slot, unless its header says that it is of no use.
@@ -396,9 +401,6 @@ class OperatorSession:
     def tell(self, error: FarhandError, seq: int | None = None) -> None:
         """Send an ``error`` message."""
         self.outbox.put(error_message(error, seq))
-
-    def _lease_lost(self, error: FarhandError) -> None:
-        self.tell(error)
 
     # Counting what is bad
 

@@ -14,6 +14,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 
 from app.gateway.frame_job import FrameDone, FrameJob, FrameWorker
+from app.gateway.lease_keeper import RENEW_S, SILENT_S
 from app.link.header import FrameHeader
 from app.link.messages import COMMAND_TTL_MS
 from tests.gateway.running import Operator, Running, StandIn, running, settings_for, wait_for
@@ -398,6 +399,20 @@ def test_control_is_refused_while_another_drives_and_may_be_taken_over(server: R
         assert first.next("error")["code"] == "control_lost"
         first.send("arm")
         assert first.next("error")["code"] == "no_control"
+
+
+def test_who_drives_and_falls_silent_loses_control(server: Running, node: StandIn) -> None:
+    # As on a link that swallows everything: the connection stays open.
+    with server.operator() as operator:
+        take_and_arm(operator)
+        heard = time.monotonic()
+        while time.monotonic() < heard + SILENT_S + 2 * RENEW_S:
+            operator.send("ping", t=1)
+            operator.next("pong")
+            time.sleep(0.1)
+        assert node.holder == operator.hello["session"]
+        assert "control is lost" in operator.next("error", code="control_lost")["message"]
+        assert node.holder is None
 
 
 def test_the_lease_is_given_back_when_the_browser_goes(server: Running, node: StandIn) -> None:
