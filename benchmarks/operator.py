@@ -12,6 +12,7 @@ from websockets.exceptions import ConnectionClosed
 
 from app.link.header import FrameHeader
 
+ASK_AGAIN_S = 5.0
 MAX_IN_FLIGHT = 2
 """Frames under way at once, as docs/protocol.md asks of a client."""
 
@@ -89,12 +90,21 @@ class Operator:
         await self._socket.send(json.dumps({"type": kind, **fields}))
 
     async def take_and_arm(self) -> None:
-        """Take control and arm, and wait until the robot says so."""
+        """Take control and arm, and wait until the robot says so.
+
+        On a busy machine a request can go unanswered, and control run out before it is armed: both
+        are asked for again.
+
+        Raises:
+            TimeoutError: it was not armed within two minutes.
+        """
         await self.wait_for(lambda: self.robot.get("mode") == "disarmed", 60)
-        await self.say("take_control")
-        await self.wait_for(lambda: self.robot.get("controller"))
-        await self.say("arm")
-        await self.wait_for(lambda: self.robot.get("armed"))
+        async with asyncio.timeout(60):
+            while not self.robot.get("armed"):
+                wanted = "armed" if self.robot.get("controller") else "controller"
+                await self.say("arm" if wanted == "armed" else "take_control")
+                with contextlib.suppress(TimeoutError):
+                    await self.wait_for(lambda key=wanted: self.robot.get(key), ASK_AGAIN_S)
 
     async def show(self, jpeg: bytes, *, flood: bool = False) -> int:
         """Send one picture, or skip it when two are under way. Returns its number, or -1.
