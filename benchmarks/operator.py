@@ -5,6 +5,7 @@ import contextlib
 import json
 import time
 from collections.abc import Awaitable, Callable, Iterable
+from functools import partial
 from typing import Any, Self
 
 from websockets.asyncio.client import ClientConnection, connect
@@ -104,7 +105,10 @@ class Operator:
                 wanted = "armed" if self.robot.get("controller") else "controller"
                 await self.say("arm" if wanted == "armed" else "take_control")
                 with contextlib.suppress(TimeoutError):
-                    await self.wait_for(lambda key=wanted: self.robot.get(key), ASK_AGAIN_S)
+                    await self.wait_for(partial(self._robot_says, wanted), ASK_AGAIN_S)
+
+    def _robot_says(self, key: str) -> bool:
+        return bool(self.robot.get(key))
 
     async def show(self, jpeg: bytes, *, flood: bool = False) -> int:
         """Send one picture, or skip it when two are under way. Returns its number, or -1.
