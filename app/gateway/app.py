@@ -24,7 +24,7 @@ from app.gateway import (
     viser_proxy,
 )
 from app.gateway.auth import Gatekeeper, identity_of
-from app.gateway.errors import error_response, install_error_handlers
+from app.gateway.errors import EVERYWHERE, error_response, install_error_handlers
 from app.gateway.guard import Guard, signed_out_page, too_many_response
 from app.gateway.hub import Hub, package_version
 from app.gateway.messages import CLIENT_MESSAGES
@@ -132,6 +132,7 @@ def create_app(
         title="Farhand",
         description="Drive a robot arm by hand gestures. WebSockets: see docs/protocol.md.",
         version=package_version(),
+        responses=EVERYWHERE,
         lifespan=lifespan,
         openapi_url=None,
         docs_url=None,

@@ -24,6 +24,16 @@ _HTTP_CODES = {
     415: "unsupported_media_type",
     422: "invalid",
 }
+EVERYWHERE: dict[int | str, dict[str, Any]] = {
+    401: {"description": "not signed in"},
+    403: {"description": "not allowed to whoever asks, or from where"},
+}
+"""For the API's document: what every route may answer."""
+BAD_BODY: dict[int | str, dict[str, Any]] = {
+    400: {"description": "a body that breaks the rules of its media type"},
+    415: {"description": "a body of another media type"},
+}
+"""The same for routes that take a body."""
 INTERNAL_MESSAGE = "something went wrong inside the server; its log says what"
 
 

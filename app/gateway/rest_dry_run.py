@@ -7,6 +7,7 @@ from fastapi import APIRouter, Request
 
 from app.errors import Invalid, RequestError, RobotUnavailable
 from app.gateway.bodies import DRY_RUN_BODY
+from app.gateway.errors import BAD_BODY
 from app.gateway.json_bodies import parse_action, read_object
 from app.gateway.rest_robots import robot_of
 from app.link.messages import DryRunRequest
@@ -29,6 +30,7 @@ class Busy(RequestError):
     summary="Would an action break a limit? Nothing moves",
     openapi_extra={"requestBody": DRY_RUN_BODY},
     responses={
+        **BAD_BODY,
         404: {"description": "unknown id"},
         422: {"description": "a bad action, or an unknown pose in 'from'"},
         429: {"description": "another program is being checked"},

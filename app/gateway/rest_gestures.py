@@ -17,6 +17,7 @@ from app.gateway.enrolment import (
     matrix_json,
     run,
 )
+from app.gateway.errors import BAD_BODY
 from app.gateway.gallery import Enrolled
 from app.gateway.json_bodies import parse_action, parse_json
 from app.gateway.uploads import read_enrolment, read_image
@@ -65,6 +66,7 @@ async def list_gestures(request: Request) -> list[dict[str, Any]]:
     summary="Enrol a gesture",
     openapi_extra={"requestBody": ENROL_BODY},
     responses={
+        **BAD_BODY,
         409: {"description": "the name is taken"},
         413: {"description": "too many bytes"},
         422: {"description": "a bad name or action, or an image without a hand"},
@@ -114,6 +116,7 @@ def _enrolled_json(
     summary="Judge images as enrolment would; nothing is stored",
     openapi_extra={"requestBody": CHECK_BODY},
     responses={
+        **BAD_BODY,
         404: {"description": "unknown id in 'gesture'"},
         413: {"description": "too many bytes"},
         422: {"description": "a bad name or action, or no image"},
@@ -188,6 +191,7 @@ async def delete_gesture(request: Request, id: str) -> Response:
     summary="Enrol more images of a gesture",
     openapi_extra={"requestBody": SAMPLES_BODY},
     responses={
+        **BAD_BODY,
         404: {"description": "unknown id"},
         413: {"description": "too many bytes"},
         422: {"description": "an image without a hand"},
@@ -254,6 +258,7 @@ def _recognise(image: bytes, settings: PipelineSettings, enrolled: Enrolled) -> 
     summary="Which gesture does an image show?",
     openapi_extra={"requestBody": IMAGE_BODY},
     responses={
+        **BAD_BODY,
         413: {"description": "too many bytes"},
         422: {"description": "not an image"},
     },

@@ -7,6 +7,7 @@ from fastapi import APIRouter, Path, Request
 
 from app.errors import Invalid
 from app.gateway.bodies import PATCH_BODY
+from app.gateway.errors import BAD_BODY
 from app.gateway.json_bodies import parse_action, read_object
 from app.gateway.rest_gestures import confusions_of, gesture_json, hub_of
 from app.gestures.records import ActionVersion
@@ -31,6 +32,7 @@ def version_json(version: ActionVersion) -> dict[str, Any]:
     summary="Change a gesture's name or action, or whether it is active",
     openapi_extra={"requestBody": PATCH_BODY},
     responses={
+        **BAD_BODY,
         404: {"description": "unknown id"},
         409: {"description": "the name is taken, or 'version' is not the newest"},
         422: {"description": "a bad name or action"},
