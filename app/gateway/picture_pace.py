@@ -11,8 +11,6 @@ import asyncio
 import json
 from typing import NamedTuple
 
-from app.gateway.numbers import newer
-
 LATE_S = 0.1
 """An acknowledgement that comes this much later than the quickest one waited in a queue."""
 QUICK_S = 0.05
@@ -72,6 +70,7 @@ class PicturePace:
     def __init__(self) -> None:
         self._level = 0
         self._under_way: dict[int, float] = {}
+        """When each was sent, in the order of sending."""
         self._judged_from = 0.0
         """Pictures sent before this say nothing about the present level."""
         self._quickest = Quickest()
@@ -97,18 +96,22 @@ class PicturePace:
 
     def sent(self, sequence: int, now: float) -> None:
         """A picture is on its way."""
+        self._under_way.pop(sequence, None)
         self._under_way[sequence] = now
         # Half an interval of grace: the camera's beat and ours do not agree.
         interval = 1 / LEVELS[self._level].rate_hz
         self._due = max(self._due + interval, now + interval / 2)
 
     def acknowledge(self, sequence: int, now: float) -> None:
-        """The viewer has shown this picture, and shows none older any more."""
+        """The viewer has shown this picture, and shows none that was sent before it any more."""
         sent = self._under_way.get(sequence)
         if sent is None:
             return
-        for older in [each for each in self._under_way if not newer(each, sequence)]:
-            del self._under_way[older]
+        # By the order of sending: a camera that starts anew counts from the beginning.
+        for earlier in tuple(self._under_way):
+            del self._under_way[earlier]
+            if earlier == sequence:
+                break
         self._acknowledged.set()
         took = now - sent
         waited = took - self._quickest(took, now)

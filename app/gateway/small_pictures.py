@@ -44,7 +44,7 @@ def smaller(picture: bytes, level: Level) -> bytes:
     """
     try:
         pixels = simplejpeg.decode_jpeg(picture[HEADER_SIZE:], colorspace="BGR", fastdct=True)
-    except ValueError as error:
+    except (ValueError, RuntimeError) as error:
         log.debug("a picture cannot be made smaller: %s", error)
         return picture
     height, width = pixels.shape[:2]

@@ -5,7 +5,8 @@ import { ReconnectingSocket, socketUrl } from "./socket.js";
 
 /**
  * Events: `picture` (detail: {bitmap, seq, tick}; the listener closes the bitmap).
- * A picture that arrives while another is being decoded replaces the one that waits.
+ * A picture that arrives while another is being decoded replaces the one that waits. Each one that
+ * was shown is acknowledged, so that the server sends no more than the way here carries.
  */
 export class CameraFeed extends EventTarget {
     #socket;
@@ -17,7 +18,9 @@ export class CameraFeed extends EventTarget {
         this.name = name;
         this.pictures = 0;
         this.failures = 0; // tries in a row that brought no picture
-        this.#socket = new ReconnectingSocket(socketUrl(`ws/camera/${encodeURIComponent(name)}`));
+        this.#socket = new ReconnectingSocket(
+            socketUrl(`ws/camera/${encodeURIComponent(name)}?acks=1`),
+        );
         this.#socket.addEventListener("state", (event) => {
             if (event.detail.state === "waiting") this.failures += 1;
         });
@@ -57,6 +60,8 @@ export class CameraFeed extends EventTarget {
             } catch {
                 // A broken picture is no picture; its age will show.
             }
+            // Broken or not: it is not on its way any more.
+            this.#socket.send(JSON.stringify({ type: "shown", seq }));
         }
         this.#decoding = false;
     }
