@@ -476,7 +476,8 @@ window.farhand = Object.freeze({
         return { ...counts };
     },
     get frames() {
-        return { ...sender.counts, latencyMs: sender.latencyMs, rate: sender.rate };
+        const { counts: became, latencyMs, rate, level, width, height } = sender;
+        return { ...became, latencyMs, rate, level, width, height };
     },
     get pictures() {
         return { wrist: feeds.wrist.pictures, scene: feeds.scene.pictures };
