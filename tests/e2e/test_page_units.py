@@ -459,3 +459,114 @@ def test_levels_lower_quality_then_size_then_rate_and_keep_what_recognition_need
     sizes = run(modules, "core/jpeg.js", script, videos)
     assert sizes == [[320, 240], [320, 180], [320, 180], [240, 320], [320, 240], [500, 358]]
     assert all(min(size) >= side for size in sizes)
+
+
+def test_the_clock_takes_the_quickest_answer_and_knows_when_the_robot_showed_a_tick(
+    modules: Page,
+) -> None:
+    script = """
+    const link = new EventTarget();
+    const pings = [];
+    link.send = (type, fields) => pings.push([type, fields.t]);
+    const say = (name, detail) => link.dispatchEvent(new CustomEvent(name, { detail }));
+    const clock = new m.ServerClock(link);
+    const known = [clock.when(500)];
+    say("message", { type: "hello", tick: 1 });
+    // The server's clock is 10000 ms ahead. There and back it took 40 ms, then 400 of which all but
+    // 20 were on the way up, because frames waited there.
+    const answer = (took, up) => {
+        const now = performance.now();
+        say("message", { type: "pong", t: now - took, tick: 10000 + now - took + up });
+    };
+    answer(40, 20);
+    known.push(clock.when(500));
+    // The robot's clock is 7000 ms behind the server's; its newest state is 30 ms old.
+    say("message", { type: "robot", tick: 20000, age_ms: 30, state_tick: 12970 });
+    const taken = performance.now() - 123;
+    const wrong = () => clock.when(taken + 10000 - 7000) - taken;
+    const errors = [wrong()];
+    answer(400, 380);
+    errors.push(wrong());
+    const quickest = clock.roundTripMs;
+    say("message", { type: "pong", t: performance.now() + 5000, tick: 0 });
+    say("message", { type: "robot", tick: 20000, age_ms: null });
+    errors.push(wrong());
+    say("state", { state: "waiting" });
+    known.push(clock.when(500));
+    return { known, errors, quickest, pings };
+    """
+    found = run(modules, "core/server-clock.js", script)
+    assert found["known"] == [None, None, None]
+    assert found["errors"] == pytest.approx([0, 0, 0], abs=5)
+    assert found["quickest"] == pytest.approx(40, abs=5)
+    ((kind, sent),) = found["pings"]
+    assert (kind, sent > 0) == ("ping", True)
+
+
+FAKE_SOCKETS = """
+const real = window.WebSocket;
+const made = [];
+window.WebSocket = class {
+    static OPEN = 1;
+    constructor() { this.readyState = 0; made.push(this); }
+    close() { this.closed = true; }
+    opened() { this.readyState = 1; this.onopen(); }
+};
+const socket = new m.ReconnectingSocket("ws://nowhere/");
+const waits = [];
+socket.addEventListener("state", ({ detail }) => {
+    if (detail.state === "waiting") waits.push(detail.retryAt - performance.now());
+});
+const newest = () => made[made.length - 1];
+"""
+
+
+def test_a_socket_waits_longer_by_half_each_time_and_tries_at_once_when_the_network_is_back(
+    modules: Page,
+) -> None:
+    script = """
+    try {
+        socket.open();
+        for (let n = 0; n < 3; n += 1) {
+            newest().onclose({ code: 1006 });
+            await new Promise((go) => setTimeout(go, waits[n] + 30));
+        }
+        const tried = made.length;
+        // "connecting", without a network: this try may hang for long
+        window.dispatchEvent(new Event("online"));
+        const again = made.length - tried;
+        newest().opened();
+        window.dispatchEvent(new Event("online"));
+        socket.retryNow(); // open, and heard a moment ago
+        const left = made.length - tried - again;
+        socket.close();
+        window.dispatchEvent(new Event("online"));
+        return { waits, tried, again, left, after: made.length, gone: made.at(-2).closed };
+    } finally {
+        window.WebSocket = real;
+    }
+    """
+    found = run(modules, "core/socket.js", FAKE_SOCKETS + script)
+    for wait, middle in zip(found["waits"], (250, 375, 562.5), strict=True):
+        assert 0.75 * middle < wait < 1.25 * middle
+    assert (found["tried"], found["again"], found["left"], found["after"]) == (4, 1, 0, 5)
+    assert found["gone"]
+
+
+def test_an_open_socket_that_was_silent_is_tried_anew_when_asked(modules: Page) -> None:
+    script = """
+    const clock = performance.now.bind(performance);
+    try {
+        socket.open();
+        newest().opened();
+        performance.now = () => clock() + 2100;
+        socket.retryNow();
+        const tried = made.length;
+        socket.close();
+        return tried;
+    } finally {
+        performance.now = clock;
+        window.WebSocket = real;
+    }
+    """
+    assert run(modules, "core/socket.js", FAKE_SOCKETS + script) == 2

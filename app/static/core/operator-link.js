@@ -3,7 +3,7 @@
 import { CLIENT_MESSAGES, packFrame, parseMessage } from "./protocol.js";
 import { ReconnectingSocket, socketUrl } from "./socket.js";
 
-const SILENCE_MS = 3000; // `robot` messages come ten times a second or more
+const SILENCE_MS = 2000; // `robot` messages come ten times a second or more
 
 /**
  * Events: `state` (see ReconnectingSocket) and `message` (detail: one parsed server message).
