@@ -2,14 +2,14 @@
 
 python -m benchmarks.slow_link [--runs 5] [--seconds 20] [--cut 3] [--save FILE]
 
-The link is the tests' own proxy (``tests/slow_link.py``) with 75 ms and 2 Mbit/s each way, for all of
-the page's connections together; ``--round-trip`` and ``--rate`` choose another. A webcam shows ``up``
-again and again, the 3D view is hidden. Browser, server and robot share one machine and its monotonic
-clock, so that ages are true ones:
+The link is the tests' own proxy (``tests/slow_link.py``) with 75 ms and 2 Mbit/s each way, for all
+of the page's connections together; ``--round-trip`` and ``--rate`` choose another. A webcam shows
+``up`` again and again, the 3D view is hidden. Browser, server and robot share one machine and its
+monotonic clock, so that ages are true ones:
 
 - *picture age*: of what stands on the screen, looked at all the time, from when the robot stood so.
 - *age as the page tells it*: minus the true one, when a picture is drawn.
-- *frame to its answer*: from the webcam's picture to its ``frame`` message on the page, by the page.
+- *frame to its answer*: from the webcam's picture to its ``frame`` message, by the page's average.
 - *frame to command*: from the webcam's picture to the command for the robot node.
 - *back*: from the restored link to a page that hears the robot again, without control and disarmed;
   from the cut it is this and the cut. ``reloads`` counts pages that were loaded anew.
@@ -82,11 +82,13 @@ class Figures:
         self.rates: dict[str, list[float]] = {name: [] for name in (*CAMERAS, "frames")}
         self.levels: list[int] = []
         self.back: list[float] = []
+        self.up: list[float] = []
+        self.down: list[float] = []
         self.reloads = 0
         self.moved = 0
 
 
-def drive(page: Page, observer: Observer, seconds: float, figures: Figures) -> None:
+def drive(page: Page, link: SlowLink, observer: Observer, seconds: float, figures: Figures) -> None:
     """Look at a page that drives."""
     offset = clock_offset_ms(page)
     page.evaluate(_WATCH_FRAMES)
@@ -94,6 +96,7 @@ def drive(page: Page, observer: Observer, seconds: float, figures: Figures) -> N
     first_command = len(observer.commands)
     heights = []
     first = page.evaluate(_LOOK)
+    up, down = link.carried
     began = time.monotonic()
     while time.monotonic() - began < seconds:
         page.wait_for_timeout(20)
@@ -109,6 +112,8 @@ def drive(page: Page, observer: Observer, seconds: float, figures: Figures) -> N
             figures.answers.append(look["frames"]["latencyMs"])
         heights.append(observer.state.tool_position[2])
     took = time.monotonic() - began
+    figures.up.append((link.carried[0] - up) * 8e-6 / took)
+    figures.down.append((link.carried[1] - down) * 8e-6 / took)
     for name in CAMERAS:
         count = look["pictures"][name] - first["pictures"][name]
         figures.rates[name].append(count / took)
@@ -158,7 +163,7 @@ def measure(folder: Path, options: Namespace) -> dict[str, dict[str, float | str
                 with browser(server, video) as page:
                     wait_for(page, "Object.keys(window.farhand.shown).length === 2")
                     page.wait_for_timeout(SETTLE_MS)
-                    drive(page, observer, options.seconds, figures)
+                    drive(page, link, observer, options.seconds, figures)
                     cut(page, link, options.cut, figures)
         finally:
             stop_server(server)
@@ -177,6 +182,8 @@ def measure(folder: Path, options: Namespace) -> dict[str, dict[str, float | str
         **percentiles(figures.commands),
         "each s": sum(figures.rates["frames"]) / options.runs,
     }
+    rows["carried up, Mbit/s"] = percentiles(figures.up)
+    rows["carried down, Mbit/s"] = percentiles(figures.down)
     rows["webcam frame, kB"] = percentiles([size / 1e3 for size in figures.sizes])
     rows["level of the frames, 0 the best"] = percentiles(figures.levels)
     rows["runs in which the arm moved"] = {

@@ -20,9 +20,11 @@ class _Way:
         self._delay = delay_s
         self._rate = rate
         self._free_at = 0.0
+        self.carried = 0
 
     def carry(self, size: int) -> float:
         """Take ``size`` bytes; when they arrive, s, monotonic."""
+        self.carried += size
         self._free_at = max(self._free_at, time.monotonic()) + size / self._rate
         return self._free_at + self._delay
 
@@ -49,6 +51,11 @@ class SlowLink(Proxy):
         self._way_up = _Way(delay_s, rate)
         self._way_down = _Way(delay_s, rate)
         super().__init__(port)
+
+    @property
+    def carried(self) -> tuple[int, int]:
+        """Bytes so far, up to the server and down to the client."""
+        return self._way_up.carried, self._way_down.carried
 
     async def _pump(
         self, source: asyncio.StreamReader, sink: asyncio.StreamWriter, gate: asyncio.Event

@@ -36,6 +36,7 @@ def test_the_rate_is_kept_and_nothing_is_lost_or_out_of_order(echo: int) -> None
                 time.sleep(0.002)
         assert time.monotonic() - began >= 0.5
         assert got == sent
+        assert link.carried == (len(sent), len(sent))
 
 
 def test_a_sender_feels_that_the_link_is_slow(echo: int) -> None:
