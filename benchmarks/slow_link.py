@@ -64,7 +64,7 @@ def clock_offset_ms(page: Page) -> float:
     found = []
     for _ in range(30):
         before = time.monotonic()
-        there = page.evaluate("performance.now()")
+        there: float = page.evaluate("performance.now()")
         after = time.monotonic()
         found.append((after - before, (before + after) / 2 * 1e3 - there))
     return min(found)[1]
@@ -176,16 +176,16 @@ def measure(folder: Path, options: Namespace) -> dict[str, dict[str, float | str
             "each s": sum(figures.rates[name]) / options.runs,
             **promise(f"p99 < {AGE_MS:g}", kept=kept),
         }
-    rows["age as the page tells it minus the true one, ms"] = percentiles(figures.errors)
-    rows["frame to its answer, ms"] = percentiles(figures.answers)
+    rows["age as the page tells it minus the true one, ms"] = {**percentiles(figures.errors)}
+    rows["frame to its answer, ms"] = {**percentiles(figures.answers)}
     rows["frame to command, ms"] = {
         **percentiles(figures.commands),
         "each s": sum(figures.rates["frames"]) / options.runs,
     }
-    rows["carried up, Mbit/s"] = percentiles(figures.up)
-    rows["carried down, Mbit/s"] = percentiles(figures.down)
-    rows["webcam frame, kB"] = percentiles([size / 1e3 for size in figures.sizes])
-    rows["level of the frames, 0 the best"] = percentiles(figures.levels)
+    rows["carried up, Mbit/s"] = {**percentiles(figures.up)}
+    rows["carried down, Mbit/s"] = {**percentiles(figures.down)}
+    rows["webcam frame, kB"] = {**percentiles([size / 1e3 for size in figures.sizes])}
+    rows["level of the frames, 0 the best"] = {**percentiles(figures.levels)}
     rows["runs in which the arm moved"] = {
         "n": figures.moved,
         **promise("all", kept=figures.moved == options.runs),
