@@ -16,6 +16,9 @@ class Proxy:
         port: Where the connections go on to, on loopback.
     """
 
+    _limit = 1 << 16
+    """Bytes that a reader keeps, about."""
+
     def __init__(self, port: int) -> None:
         self._target = port
         self._up = asyncio.Event()
@@ -59,7 +62,7 @@ class Proxy:
         self.close()
 
     async def _listen(self) -> asyncio.Server:
-        return await asyncio.start_server(self._connected, "127.0.0.1", 0)
+        return await asyncio.start_server(self._connected, "127.0.0.1", 0, limit=self._limit)
 
     async def _connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         task = asyncio.current_task()
@@ -67,7 +70,9 @@ class Proxy:
         self._pumps.add(task)
         task.add_done_callback(self._pumps.discard)
         with contextlib.closing(writer.transport), contextlib.suppress(OSError):
-            there, back = await asyncio.open_connection("127.0.0.1", self._target)
+            there, back = await asyncio.open_connection(
+                "127.0.0.1", self._target, limit=self._limit
+            )
             with contextlib.closing(back.transport):
                 await asyncio.gather(
                     self._pump(reader, back, self._up), self._pump(there, writer, self._down)

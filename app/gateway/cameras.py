@@ -11,7 +11,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from app.errors import NotFound
 from app.gateway.errors import error_response
-from app.link.header import HEADER_SIZE
+from app.gateway.picture_pace import PicturePace, acknowledged
+from app.link.header import HEADER_SIZE, FrameHeader
 
 if TYPE_CHECKING:
     from app.gateway.hub import Hub
@@ -91,19 +92,18 @@ async def _next(hub: "Hub", viewer: "Viewer") -> bytes | None:
 
 @sockets.websocket("/ws/camera/{name}")
 async def camera_socket(socket: WebSocket, name: str) -> None:
-    """Every message: the 24-byte header, then a JPEG. Nothing is expected from the viewer."""
+    """Every message: the 24-byte header, then a JPEG. With ``?acks=1`` the viewer sets the pace."""
     hub: Hub = socket.app.state.hub
     try:
         hub.relay.check(name)
     except NotFound as error:
         await socket.send_denial_response(error_response(error))
         return
+    pace = PicturePace() if socket.query_params.get("acks") == "1" else None
     await socket.accept()
     async with hub.relay.view(name) as viewer:
-        tasks = [
-            asyncio.create_task(_send(socket, viewer)),
-            asyncio.create_task(_until_gone(socket)),
-        ]
+        sending = _send(socket, viewer) if pace is None else _send_paced(socket, viewer, pace)
+        tasks = [asyncio.create_task(sending), asyncio.create_task(_listen(socket, pace))]
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
@@ -118,6 +118,20 @@ async def _send(socket: WebSocket, viewer: "Viewer") -> None:
             await socket.send_bytes(await viewer.next())
 
 
-async def _until_gone(socket: WebSocket) -> None:
-    while (await socket.receive())["type"] != "websocket.disconnect":
-        pass
+async def _send_paced(socket: WebSocket, viewer: "Viewer", pace: PicturePace) -> None:
+    loop = asyncio.get_running_loop()
+    with contextlib.suppress(WebSocketDisconnect, OSError):
+        while True:
+            await pace.turn()
+            picture = await viewer.next_at(pace.level)
+            pace.sent(FrameHeader.unpack(picture).sequence, loop.time())
+            await socket.send_bytes(picture)
+
+
+async def _listen(socket: WebSocket, pace: PicturePace | None) -> None:
+    """Hear acknowledgements until the viewer is gone; all else that it sends is ignored."""
+    loop = asyncio.get_running_loop()
+    while (message := await socket.receive())["type"] != "websocket.disconnect":
+        sequence = acknowledged(message.get("text"))
+        if pace is not None and sequence is not None:
+            pace.acknowledge(sequence, loop.time())

@@ -13,6 +13,7 @@ from contextlib import asynccontextmanager
 
 from app.errors import FarhandError, NotFound, WorldError
 from app.gateway.robot_port import RobotPort, Watch
+from app.gateway.small_pictures import SmallPictures
 from app.link.header import HEADER_SIZE, FrameHeader
 from app.link.messages import CameraDescription
 
@@ -32,9 +33,14 @@ class NoPicture(WorldError):
 
 
 class Viewer:
-    """One viewer's slot. Used on the event loop only."""
+    """One viewer's slot. Used on the event loop only.
 
-    def __init__(self) -> None:
+    Args:
+        small: Makes the camera's pictures smaller.
+    """
+
+    def __init__(self, small: SmallPictures) -> None:
+        self._small = small
         self._picture: bytes | None = None
         self._ready = asyncio.Event()
         self.dropped = 0
@@ -54,6 +60,10 @@ class Viewer:
         picture, self._picture = self._picture, None
         return picture
 
+    async def next_at(self, level: int) -> bytes:
+        """:meth:`next`, at one of :data:`~app.gateway.picture_pace.LEVELS`."""
+        return await self._small(await self.next(), level)
+
 
 class _Camera:
     """The viewers of one camera and the watch that feeds them."""
@@ -61,6 +71,7 @@ class _Camera:
     def __init__(self, name: str) -> None:
         self.name = name
         self.viewers: set[Viewer] = set()
+        self.small = SmallPictures()
         self.watch: Watch | None = None
         self.task: asyncio.Task[None] | None = None
 
@@ -116,7 +127,7 @@ class Relay:
         """
         self.check(name)
         camera = self._cameras.setdefault(name, _Camera(name))
-        viewer = Viewer()
+        viewer = Viewer(camera.small)
         camera.viewers.add(viewer)
         if camera.task is None or camera.task.done():
             camera.task = asyncio.create_task(self._keep_watch(camera))

@@ -33,6 +33,7 @@ def robot_message(robot: RobotPort) -> dict[str, Any]:
     }
     if state is not None:
         message |= {
+            "state_tick": state.tick,
             "joints": [round(joint, 6) for joint in state.joints],
             "velocities": [round(velocity, 6) for velocity in state.velocities],
             "gripper": round(state.gripper, 6),

@@ -8,6 +8,7 @@ import { changesFor, INITIAL_STATE } from "./core/messages.js";
 import { OperatorLink } from "./core/operator-link.js";
 import { preflight } from "./core/preflight.js";
 import { SourceKeeper } from "./core/source-keeper.js";
+import { ServerClock } from "./core/server-clock.js";
 import { Stopper } from "./core/stopper.js";
 import { Store } from "./core/store.js";
 import { texts } from "./texts/en.js";
@@ -55,7 +56,9 @@ const robotId = () => {
     return robot && typeof robot === "object" ? robot.id : robot || null;
 };
 const stopper = new Stopper(link, api, robotId);
-const feeds = { wrist: new CameraFeed("wrist"), scene: new CameraFeed("scene") };
+const clock = new ServerClock(link);
+const when = (tick) => clock.when(tick);
+const feeds = { wrist: new CameraFeed("wrist", when), scene: new CameraFeed("scene", when) };
 const counts = { hello: 0, frame: 0, gesture: 0, robot: 0, gallery: 0, pong: 0, error: 0 };
 let lastError = null;
 
@@ -225,18 +228,18 @@ document.addEventListener("visibilitychange", () => {
 });
 
 const REPORT_EVERY_MS = 250;
-const shown = {}; // newest tick of the robot in the pictures that were drawn, by camera
+const shown = {}; // what is known of the newest picture that was drawn, by camera
 let reported = {};
 for (const [name, feed] of Object.entries(feeds)) {
     feed.addEventListener("picture", ({ detail }) => {
-        shown[name] = detail.tick;
+        shown[name] = { tick: detail.tick, takenAt: detail.takenAt, shownAt: performance.now() };
     });
 }
 
 /** Who drives by pictures says which ones: the robot holds still when they are old. */
 setInterval(() => {
     if (!isDriving(store.state)) return;
-    for (const [camera, tick] of Object.entries(shown)) {
+    for (const [camera, { tick }] of Object.entries(shown)) {
         if (reported[camera] === tick) continue;
         reported[camera] = tick;
         link.send("picture", { camera, tick });
@@ -451,7 +454,8 @@ byId("teach-open").addEventListener("click", () => teach());
 /**
  * For tests in a browser and for the curious; reads only. `robot`, `frame`, `gesture`, `hello` are
  * the newest messages, `counts` how many of each type came, `frames` what became of the webcam's
- * pictures, `pictures` how many each robot camera has shown, `error` the newest `error` message.
+ * pictures, `pictures` how many each robot camera has shown, `shown` what the newest of them is
+ * ({tick, takenAt, shownAt}), `error` the newest `error` message.
  */
 window.farhand = Object.freeze({
     get state() {
@@ -476,10 +480,14 @@ window.farhand = Object.freeze({
         return { ...counts };
     },
     get frames() {
-        return { ...sender.counts, latencyMs: sender.latencyMs, rate: sender.rate };
+        const { counts: became, latencyMs, rate, level, width, height } = sender;
+        return { ...became, latencyMs, rate, level, width, height };
     },
     get pictures() {
         return { wrist: feeds.wrist.pictures, scene: feeds.scene.pictures };
+    },
+    get shown() {
+        return { ...shown };
     },
 });
 

@@ -1,6 +1,7 @@
 """The page's modules by themselves: no server behind them but one for static files."""
 
 import gzip
+import itertools
 import json
 import re
 import struct
@@ -14,10 +15,11 @@ from typing import Any, get_args
 import pytest
 from playwright.sync_api import Page, Playwright
 
+from app.config import DecodeSettings
 from app.gateway.messages import CLIENT_MESSAGES, SERVER_MESSAGES
 from app.link.actions import ACTION
 from app.link.header import HEADER_SIZE, FrameHeader
-from app.link.messages import Doubt
+from app.link.messages import COMMAND_TTL_MS, Doubt
 from app.robot.controller import DOUBTS
 from tests.e2e.running import BASE_ARGUMENTS
 
@@ -397,3 +399,174 @@ def test_a_slider_is_no_field_that_swallows_the_stop_key(modules: Page) -> None:
         "return [...host.children].map(m.isField)"
     )
     assert run(modules, "ui/dom.js", script, ["text", "number", "range"]) == [True, True, False]
+
+
+PLAYED_LINK = """
+const pace = new m.SendPace();
+let now = 1000;
+const show = (queueMs, times = 1) => {
+    for (let n = 0; n < times; n += 1) {
+        const sentAt = now;
+        now += 150 + queueMs;
+        pace.answered(sentAt, now);
+    }
+};
+const showFor = (ms, queueMs = 0) => { for (const end = now + ms; now < end; ) show(queueMs); };
+const seen = [];
+const see = () => seen.push(pace.level);
+"""
+
+
+def test_fewer_and_smaller_frames_go_up_while_answers_are_late(modules: Page) -> None:
+    def play(script: str) -> Any:
+        return run(modules, "core/send-pace.js", f"{PLAYED_LINK} {script} return seen")
+
+    last = run(modules, "core/send-pace.js", "return m.LEVELS.length - 1")
+    assert play("show(0, 200); see();") == [0], "a long way is no queue"
+    assert play("show(0, 9); show(500); show(0); see(); show(200, 2); see();") == [0, 1]
+    assert play("show(0, 9); show(200, 100); see();") == [last]
+    # Frames that were on their way before the change do not judge the new level.
+    burst = "for (const n of [1, 2, 3, 4]) pace.answered(now, now + 400 + n);"
+    assert play(f"show(0, 9); {burst} see();") == [1]
+    # Up again, a step after three quick seconds; and back where the queue comes from.
+    up = "show(0, 9); show(200, 4); see(); showFor(2500); see(); showFor(1000); see();"
+    assert play(f"{up} showFor(3500); see();") == [2, 2, 1, 0]
+    # What proves too much is tried ever more rarely.
+    wait = (
+        "{ const began = now; while (pace.level) show(0); seen.push(now - began); show(200, 2); }"
+    )
+    first, second, third = play(f"show(0, 9); show(200, 2); {wait * 3}")
+    assert second > 1.5 * first
+    assert third > 1.5 * second
+    # Another connection may be another way: its first answers set what is quick.
+    assert play("show(0, 9); pace.forget(); show(300, 40); see();") == [0]
+
+
+def test_levels_lower_quality_then_size_then_rate_and_keep_what_recognition_needs(
+    modules: Page,
+) -> None:
+    levels = run(modules, "core/send-pace.js", "return m.LEVELS")
+    steps = [(each["intervalMs"], each["halved"]) for each in levels]
+    assert steps == sorted(steps)
+    for one, next_ in itertools.pairwise(levels):
+        if one["halved"] == next_["halved"]:
+            assert one["quality"] >= next_["quality"]
+    slowest = levels[-1]["intervalMs"]
+    assert 2 * slowest < COMMAND_TTL_MS, "one lost frame stops no motion"
+    side = DecodeSettings().working_side
+    script = "return a.map(([w, h]) => m.sentSize(w, h, true))"
+    videos = [(640, 480), (1280, 720), (640, 360), (480, 640), (320, 240), (500, 358)]
+    sizes = run(modules, "core/jpeg.js", script, videos)
+    assert sizes == [[320, 240], [320, 180], [320, 180], [240, 320], [320, 240], [500, 358]]
+    assert all(min(size) >= side for size in sizes)
+
+
+def test_the_clock_takes_the_quickest_answer_and_knows_when_the_robot_showed_a_tick(
+    modules: Page,
+) -> None:
+    script = """
+    const link = new EventTarget();
+    const pings = [];
+    link.send = (type, fields) => pings.push([type, fields.t]);
+    const say = (name, detail) => link.dispatchEvent(new CustomEvent(name, { detail }));
+    const clock = new m.ServerClock(link);
+    const known = [clock.when(500)];
+    say("message", { type: "hello", tick: 1 });
+    // The server's clock is 10000 ms ahead. There and back it took 40 ms, then 400 of which all but
+    // 20 were on the way up, because frames waited there.
+    const answer = (took, up) => {
+        const now = performance.now();
+        say("message", { type: "pong", t: now - took, tick: 10000 + now - took + up });
+    };
+    answer(40, 20);
+    known.push(clock.when(500));
+    // The robot's clock is 7000 ms behind the server's; its newest state is 30 ms old.
+    say("message", { type: "robot", tick: 20000, age_ms: 30, state_tick: 12970 });
+    const taken = performance.now() - 123;
+    const wrong = () => clock.when(taken + 10000 - 7000) - taken;
+    const errors = [wrong()];
+    answer(400, 380);
+    errors.push(wrong());
+    const quickest = clock.roundTripMs;
+    say("message", { type: "pong", t: performance.now() + 5000, tick: 0 });
+    say("message", { type: "robot", tick: 20000, age_ms: null });
+    errors.push(wrong());
+    say("state", { state: "waiting" });
+    known.push(clock.when(500));
+    return { known, errors, quickest, pings };
+    """
+    found = run(modules, "core/server-clock.js", script)
+    assert found["known"] == [None, None, None]
+    assert found["errors"] == pytest.approx([0, 0, 0], abs=5)
+    assert found["quickest"] == pytest.approx(40, abs=5)
+    ((kind, sent),) = found["pings"]
+    assert (kind, sent > 0) == ("ping", True)
+
+
+FAKE_SOCKETS = """
+const real = window.WebSocket;
+const made = [];
+window.WebSocket = class {
+    static OPEN = 1;
+    constructor() { this.readyState = 0; made.push(this); }
+    close() { this.closed = true; }
+    opened() { this.readyState = 1; this.onopen(); }
+};
+const socket = new m.ReconnectingSocket("ws://nowhere/");
+const waits = [];
+socket.addEventListener("state", ({ detail }) => {
+    if (detail.state === "waiting") waits.push(detail.retryAt - performance.now());
+});
+const newest = () => made[made.length - 1];
+"""
+
+
+def test_a_socket_waits_longer_by_half_each_time_and_tries_at_once_when_the_network_is_back(
+    modules: Page,
+) -> None:
+    script = """
+    try {
+        socket.open();
+        for (let n = 0; n < 3; n += 1) {
+            newest().onclose({ code: 1006 });
+            await new Promise((go) => setTimeout(go, waits[n] + 30));
+        }
+        const tried = made.length;
+        // "connecting", without a network: this try may hang for long
+        window.dispatchEvent(new Event("online"));
+        const again = made.length - tried;
+        newest().opened();
+        window.dispatchEvent(new Event("online"));
+        socket.retryNow(); // open, and heard a moment ago
+        const left = made.length - tried - again;
+        socket.close();
+        window.dispatchEvent(new Event("online"));
+        return { waits, tried, again, left, after: made.length, gone: made.at(-2).closed };
+    } finally {
+        window.WebSocket = real;
+    }
+    """
+    found = run(modules, "core/socket.js", FAKE_SOCKETS + script)
+    for wait, middle in zip(found["waits"], (250, 375, 562.5), strict=True):
+        assert 0.75 * middle < wait < 1.25 * middle
+    assert (found["tried"], found["again"], found["left"], found["after"]) == (4, 1, 0, 5)
+    assert found["gone"]
+
+
+def test_an_open_socket_that_was_silent_is_tried_anew_when_asked(modules: Page) -> None:
+    script = """
+    const clock = performance.now.bind(performance);
+    try {
+        socket.open();
+        newest().opened();
+        performance.now = () => clock() + 2100;
+        socket.retryNow();
+        const tried = made.length;
+        socket.close();
+        return tried;
+    } finally {
+        performance.now = clock;
+        window.WebSocket = real;
+    }
+    """
+    assert run(modules, "core/socket.js", FAKE_SOCKETS + script) == 2

@@ -311,12 +311,14 @@ class StandIn:
 class StandInCamera:
     """Publishes numbered pictures while somebody watches, as the camera process does."""
 
-    def __init__(self, node: StandIn, name: str, size: int = 20_000) -> None:
+    def __init__(
+        self, node: StandIn, name: str, size: int = 20_000, jpeg: bytes | None = None
+    ) -> None:
         self.published = 0
         self.watched = False
         self._session = open_session(node.endpoint, listen=False)
         self._publisher = self._session.declare_publisher(key(node.robot, f"camera/{name}"))
-        self._size = size
+        self._jpeg = jpeg or b"\xff\xd8" + bytes(size) + b"\xff\xd9"
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, name="stand-in-camera")
         self._thread.start()
@@ -327,8 +329,7 @@ class StandInCamera:
             if self.watched:
                 self.published += 1
                 header = FrameHeader(self.published, time.monotonic() * 1000, 1).pack()
-                jpeg = b"\xff\xd8" + bytes(self._size) + b"\xff\xd9"
-                self._publisher.put(header + jpeg)
+                self._publisher.put(header + self._jpeg)
 
     def __enter__(self) -> "StandInCamera":
         return self

@@ -1,14 +1,18 @@
 """The relay of camera pictures, with a camera that counts what it publishes."""
 
 import asyncio
+import json
 import threading
 import time
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 from websockets.exceptions import InvalidStatus
+from websockets.sync.client import ClientConnection
 
 from app.gateway import relay as module
+from app.gateway.picture_pace import LEVELS
 from app.gateway.relay import Relay
 from app.link.header import HEADER_SIZE, FrameHeader
 from tests.gateway.running import Running, StandIn, StandInCamera, wait_for
@@ -113,6 +117,63 @@ def test_what_a_viewer_sends_is_ignored(server: Running, node: StandIn) -> None:
         viewer.send(b"\x00")
         viewer.recv(timeout=10)
         viewer.recv(timeout=10)
+
+
+def shown(viewer: ClientConnection, message: bytes) -> None:
+    sequence = FrameHeader.unpack(message).sequence
+    viewer.send(json.dumps({"type": "shown", "seq": sequence}))
+
+
+def test_who_acknowledges_late_gets_smaller_pictures_and_who_does_not_gets_them_as_they_are(
+    server: Running, node: StandIn, hand: Callable[..., bytes]
+) -> None:
+    jpeg = hand("forward")
+    with (
+        StandInCamera(node, "wrist", jpeg=jpeg),
+        server.socket("/ws/camera/wrist?acks=1") as late,
+        server.socket("/ws/camera/wrist") as plain,
+    ):
+        for _ in range(5):
+            message = late.recv(timeout=10)
+            assert message[HEADER_SIZE:] == jpeg
+            shown(late, message)
+        wait_s = 0.2
+        deadline = time.monotonic() + 60
+        while len(message) > len(jpeg) / 2:
+            assert time.monotonic() < deadline
+            message = late.recv(timeout=10)
+            time.sleep(wait_s)
+            shown(late, message)
+        before = FrameHeader.unpack(plain.recv(timeout=10)).sequence
+        for _ in range(30):
+            whole = plain.recv(timeout=10)
+            assert whole[HEADER_SIZE:] == jpeg
+            assert FrameHeader.unpack(whole).sequence > before
+
+
+def test_who_acknowledges_nothing_gets_a_few_pictures_and_slows_nobody(
+    server: Running, node: StandIn
+) -> None:
+    with (
+        StandInCamera(node, "wrist") as camera,
+        server.socket("/ws/camera/wrist?acks=1") as silent,
+        server.socket("/ws/camera/wrist?acks=1") as quick,
+    ):
+        got = []
+        for _ in range(LEVELS[0].under_way):
+            got.append(FrameHeader.unpack(silent.recv(timeout=10)).sequence)
+        # None of this is an acknowledgement of what was sent.
+        for text in ("hello", "[" * 5000, '{"type":"shown","seq":"1"}', '{"type":"shown","seq":0}'):
+            silent.send(text)
+        silent.send(b"\x00")
+        first = camera.published
+        while camera.published < first + 40:
+            shown(quick, quick.recv(timeout=10))
+        with pytest.raises(TimeoutError):
+            silent.recv(timeout=0.2)
+        silent.send(json.dumps({"type": "shown", "seq": got[-1]}))
+        # It goes on with what is new.
+        assert FrameHeader.unpack(silent.recv(timeout=10)).sequence > first
 
 
 class Robot:

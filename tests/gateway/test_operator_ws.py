@@ -662,6 +662,8 @@ def test_the_robot_message_tells_what_the_supervisor_and_the_limits_do(server: R
          "reason": None},
     ]  # fmt: skip
     assert robot["dropped"] == {"epoch": 3}
+    # The stand-in's clock is this machine's, as the server's is.
+    assert robot["tick"] - robot["age_ms"] - robot["state_tick"] == pytest.approx(0, abs=1000)
 
 
 def test_things_are_put_back_over_rest_unless_the_robot_is_armed(

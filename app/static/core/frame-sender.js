@@ -1,16 +1,17 @@
 // From a playing <video> to JPEG frames on the operator link, newest first.
 
 import { JpegEncoder } from "./jpeg.js";
+import { SendPace } from "./send-pace.js";
 
 const IN_FLIGHT = 2;
 const FORGET_MS = 1000; // an answer that has not come by then will not come
-const QUALITY = 0.8;
 const BACKLOG_BYTES = 96 * 1024; // what may wait in the browser before frames are left out
 const FALLBACK_INTERVAL_MS = 33;
 
 /**
  * Sends each new picture of the video while fewer than two wait for their answer. Call `answered`
- * with the `seq` of every `frame` and `error` message. `width` and `height` are of the last one sent.
+ * with the `seq` of every `frame` and `error` message. How often, and how large and good a picture is
+ * sent, follows from how soon it is answered. `width` and `height` are of the last one answered.
  */
 export class FrameSender {
     #link;
@@ -19,7 +20,9 @@ export class FrameSender {
     #running = 0; // changes with every start and stop; old callbacks see that they are old
     #timer = 0;
     #seq = 0;
-    #inFlight = new Map(); // seq -> {capturedMs, sentAt}
+    #pace = new SendPace();
+    #inFlight = new Map(); // seq -> {capturedMs, sentAt, width, height}
+    #sentAt = -Infinity;
     #encoding = false;
     #fresh = null; // capture time of a picture that has not been sent
 
@@ -31,6 +34,11 @@ export class FrameSender {
         this.counts = { captured: 0, sent: 0, answered: 0, lost: 0 };
         this.latencyMs = null;
         this.sentTimes = [];
+    }
+
+    /** Which of the pace's LEVELS is in force; 0 is the best. */
+    get level() {
+        return this.#pace.level;
     }
 
     /** Frames sent in the last second. */
@@ -71,6 +79,7 @@ export class FrameSender {
     /** Nothing sent so far will be answered: the connection is another one. */
     forget() {
         this.#inFlight.clear();
+        this.#pace.forget();
         this.latencyMs = null;
     }
 
@@ -82,7 +91,11 @@ export class FrameSender {
             if (older <= seq) this.#inFlight.delete(older);
         }
         this.counts.answered += 1;
-        const took = performance.now() - frame.capturedMs;
+        const now = performance.now();
+        this.#pace.answered(frame.sentAt, now);
+        this.width = frame.width;
+        this.height = frame.height;
+        const took = now - frame.capturedMs;
         this.latencyMs = this.latencyMs === null ? took : this.latencyMs * 0.8 + took * 0.2;
         if (this.#fresh !== null) this.#send();
         return took;
@@ -100,24 +113,28 @@ export class FrameSender {
         for (const [seq, frame] of this.#inFlight) {
             if (now - frame.sentAt < FORGET_MS) continue;
             this.#inFlight.delete(seq);
+            this.#pace.answered(frame.sentAt, now);
             this.counts.lost += 1;
         }
+        const { quality, halved, intervalMs } = this.#pace.wanted;
+        // Half a frame of grace: the webcam's beat and ours do not agree.
+        if (now - this.#sentAt < intervalMs - FALLBACK_INTERVAL_MS / 2) return;
         if (this.#inFlight.size >= IN_FLIGHT || this.#link.waitingBytes > BACKLOG_BYTES) return;
         const capturedMs = this.#fresh;
         const run = this.#running;
         this.#fresh = null;
         this.#encoding = true;
         try {
-            const picture = await this.#encoder.encode(this.#video, QUALITY);
+            const picture = await this.#encoder.encode(this.#video, quality, halved);
             if (!picture || run !== this.#running) return;
             const seq = this.#seq + 1;
             if (!this.#link.sendFrame(seq, capturedMs, picture.jpeg)) return;
             this.#seq = seq;
-            this.#inFlight.set(seq, { capturedMs, sentAt: performance.now() });
-            this.sentTimes.push(performance.now());
+            const { width, height } = picture;
+            this.#sentAt = performance.now();
+            this.#inFlight.set(seq, { capturedMs, sentAt: this.#sentAt, width, height });
+            this.sentTimes.push(this.#sentAt);
             this.counts.sent += 1;
-            this.width = picture.width;
-            this.height = picture.height;
         } catch (error) {
             // A video that was just taken away gives no picture; anything else is worth knowing.
             if (run === this.#running && error.name !== "InvalidStateError") throw error;

@@ -2,10 +2,15 @@
 
 const WIDEST = 640;
 const TALLEST = 720;
+const WORKING_SIDE = 180; // the server makes no picture smaller: pipeline.decode.working_side
 
-/** The picture size to send for a video of this size: at most 640 wide, never enlarged. */
-export function sentSize(width, height) {
-    const scale = Math.min(1, WIDEST / width, TALLEST / height);
+/**
+ * The picture size to send for a video of this size: at most 640 wide, never enlarged. `halved` is
+ * half of that, where the server would halve it anyway.
+ */
+export function sentSize(width, height, halved = false) {
+    let scale = Math.min(1, WIDEST / width, TALLEST / height);
+    if (halved && Math.floor(Math.min(width, height) * scale) / 2 >= WORKING_SIDE) scale /= 2;
     return [Math.max(1, Math.round(width * scale)), Math.max(1, Math.round(height * scale))];
 }
 
@@ -42,9 +47,9 @@ export class JpegEncoder {
     }
 
     /** The video's picture now as {jpeg: ArrayBuffer, width, height}; null before the first one. */
-    async encode(video, quality) {
+    async encode(video, quality, halved = false) {
         if (!video.videoWidth || video.readyState < 2) return null;
-        const [width, height] = sentSize(video.videoWidth, video.videoHeight);
+        const [width, height] = sentSize(video.videoWidth, video.videoHeight, halved);
         if (this.#worker) {
             const picture = await take(video);
             const answered = new Promise((resolve) => {

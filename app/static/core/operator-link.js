@@ -3,8 +3,7 @@
 import { CLIENT_MESSAGES, packFrame, parseMessage } from "./protocol.js";
 import { ReconnectingSocket, socketUrl } from "./socket.js";
 
-const SILENCE_MS = 3000; // `robot` messages come ten times a second or more
-const PING_MS = 500; // who drives and is silent for 2 s loses control
+const SILENCE_MS = 2000; // `robot` messages come ten times a second or more
 
 /**
  * Events: `state` (see ReconnectingSocket) and `message` (detail: one parsed server message).
@@ -43,7 +42,6 @@ export class OperatorLink extends EventTarget {
 
     open() {
         this.#socket.open();
-        setInterval(() => this.isOpen && this.send("ping", { t: performance.now() }), PING_MS);
     }
 
     retryNow() {

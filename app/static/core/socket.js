@@ -1,8 +1,10 @@
 // A WebSocket that comes back.
 
 const FIRST_DELAY_MS = 250;
+const LONGER = 1.5; // each delay than the one before, and a fifth of it either way by chance
 const LONGEST_DELAY_MS = 5000;
 const OPENING_MS = 6000;
+const DOUBT_MS = 2000; // an open socket that was silent for so long is tried anew when asked
 
 /** The address of `path` on the page's own server, as ws: or wss:. */
 export function socketUrl(path) {
@@ -15,7 +17,8 @@ export function socketUrl(path) {
  * Events: `state` (detail: {state, retryAt, code, reason}) where state is "closed", "connecting",
  * "open" or "waiting" (for the next try, at `retryAt` on performance.now()); and `message` (detail:
  * data).
- * A socket that says nothing for `silenceMs` counts as dead: a pulled plug sends no close.
+ * A socket that says nothing for `silenceMs` counts as dead: a pulled plug sends no close. When the
+ * browser says that the network is back, it is tried at once.
  */
 export class ReconnectingSocket extends EventTarget {
     #url;
@@ -32,6 +35,10 @@ export class ReconnectingSocket extends EventTarget {
         this.#url = url;
         this.#silenceMs = silenceMs;
         this.state = "closed";
+        // A try that began without a network may wait for seconds yet.
+        window.addEventListener("online", () => {
+            if (this.#wanted && this.state !== "open") this.#tryNow();
+        });
     }
 
     get isOpen() {
@@ -56,11 +63,11 @@ export class ReconnectingSocket extends EventTarget {
         this.#tell("closed");
     }
 
-    /** Try now, without waiting for the back-off. */
+    /** Try now, without waiting for the back-off; leaves alone what is open and alive. */
     retryNow() {
-        if (!this.#wanted || this.state === "open" || this.state === "connecting") return;
-        this.#delay = FIRST_DELAY_MS;
-        this.#connect();
+        if (!this.#wanted || this.state === "connecting") return;
+        if (this.state === "open" && performance.now() - this.#heardAt < DOUBT_MS) return;
+        this.#tryNow();
     }
 
     /** Send; false when the socket is not open. */
@@ -68,6 +75,11 @@ export class ReconnectingSocket extends EventTarget {
         if (!this.isOpen) return false;
         this.#socket.send(data);
         return true;
+    }
+
+    #tryNow() {
+        this.#delay = FIRST_DELAY_MS;
+        this.#connect();
     }
 
     #connect() {
@@ -100,7 +112,7 @@ export class ReconnectingSocket extends EventTarget {
         this.#drop();
         if (!this.#wanted) return;
         const wait = this.#delay * (0.8 + 0.4 * Math.random());
-        this.#delay = Math.min(this.#delay * 2, LONGEST_DELAY_MS);
+        this.#delay = Math.min(this.#delay * LONGER, LONGEST_DELAY_MS);
         this.#timer = setTimeout(() => this.#connect(), wait);
         this.#tell("waiting", { retryAt: performance.now() + wait, code, reason });
     }

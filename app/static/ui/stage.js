@@ -12,7 +12,7 @@ class CameraView {
     constructor(name, feed, { enlarge, swap }) {
         this.name = name;
         this.feed = feed;
-        this.arrivedAt = 0;
+        this.takenAt = 0;
         this.open = false;
         this.visible = false;
         const label = texts.stage.views[name];
@@ -44,7 +44,7 @@ class CameraView {
             el("div", { class: "view-tools" }, swapButton),
         );
         this.context = this.canvas.getContext("2d");
-        feed.addEventListener("picture", (event) => this.#draw(event.detail.bitmap));
+        feed.addEventListener("picture", (event) => this.#draw(event.detail));
     }
 
     /** What the robot's profile calls this camera. */
@@ -62,24 +62,24 @@ class CameraView {
     }
 
     tick(now) {
-        const late = this.arrivedAt ? now - this.arrivedAt : 0;
+        const late = this.takenAt ? now - this.takenAt : 0;
         const old = this.open && late > OLD_MS;
         this.element.classList.toggle("is-old", old);
         setText(this.age, old ? texts.stage.age((late / 1000).toFixed(1)) : "");
-        if (!this.arrivedAt && this.open) {
+        if (!this.takenAt && this.open) {
             const dead = this.feed.failures > 1;
             setText(this.empty, dead ? texts.stage.noCamera : texts.stage.noPicture);
         }
     }
 
-    #draw(bitmap) {
+    #draw({ bitmap, takenAt }) {
         if (this.canvas.width !== bitmap.width || this.canvas.height !== bitmap.height) {
             this.canvas.width = bitmap.width;
             this.canvas.height = bitmap.height;
         }
         this.context.drawImage(bitmap, 0, 0);
         bitmap.close();
-        this.arrivedAt = performance.now();
+        this.takenAt = takenAt;
         this.element.classList.remove("is-empty");
     }
 }

@@ -1,0 +1,156 @@
+"""How many pictures of the robot one viewer gets, and how large: what its acknowledgements allow.
+
+A viewer that acknowledges what it has shown is sent no more than the link carries: only a few
+pictures are under way at once, and rate, size and quality go down while acknowledgements come late
+and up again, a step at a time, when they are quick. What is late is judged against the quickest
+acknowledgement of the last minute, because a long way is no reason for small pictures; a queue is
+(the same reasoning as in BBR, Cardwell et al. 2016).
+"""
+
+import asyncio
+import json
+from typing import NamedTuple
+
+LATE_S = 0.1
+"""An acknowledgement that comes this much later than the quickest one waited in a queue."""
+QUICK_S = 0.05
+LATE_IN_A_ROW = 2
+STEADY_S = 3.0
+"""So long acknowledgements must be quick before the next larger level is tried."""
+LONGEST_STEADY_S = 60.0
+"""A level that proves too much is tried again after twice as long, and at last after this."""
+WINDOW_S = 30.0
+"""The quickest acknowledgement is that of this window and the one before it."""
+MAX_ACK = 64
+"""Characters of an acknowledgement."""
+
+
+class Level(NamedTuple):
+    """How pictures are sent."""
+
+    rate_hz: float
+    """Pictures a second, at most."""
+    under_way: int
+    """Sent and not acknowledged, at most."""
+    scale: float = 1.0
+    """Part of the camera's width and height."""
+    quality: int | None = None
+    """JPEG quality; None: as the camera made it."""
+
+
+LEVELS = (
+    Level(30.0, 4),
+    Level(15.0, 2),
+    Level(10.0, 2),
+    Level(10.0, 2, 0.75, 70),
+    Level(10.0, 2, 0.5, 60),
+    Level(5.0, 1, 0.5, 40),
+)
+"""Best first. The rate goes down first: it costs no work, and a still picture stays sharp."""
+
+
+class Quickest:
+    """The shortest of the last times, over two windows, so that a changed way is noticed."""
+
+    def __init__(self) -> None:
+        self._began = float("-inf")
+        self._now = self._before = float("inf")
+
+    def __call__(self, took: float, now: float) -> float:
+        """Add a time, s, and return the shortest, s."""
+        if now - self._began > WINDOW_S:
+            self._began, self._before, self._now = now, self._now, float("inf")
+        self._now = min(self._now, took)
+        return min(self._now, self._before)
+
+
+class PicturePace:
+    """The pace of one viewer. Used on the event loop only; times are monotonic seconds."""
+
+    def __init__(self) -> None:
+        self._level = 0
+        self._under_way: dict[int, float] = {}
+        """When each was sent, in the order of sending."""
+        self._judged_from = 0.0
+        """Pictures sent before this say nothing about the present level."""
+        self._quickest = Quickest()
+        self._late = 0
+        self._quick_since: float | None = None
+        self._steady = STEADY_S
+        self._raised_at = float("-inf")
+        self._due = 0.0
+        self._acknowledged = asyncio.Event()
+
+    @property
+    def level(self) -> int:
+        """Index in :data:`LEVELS`."""
+        return self._level
+
+    async def turn(self) -> None:
+        """Wait until the viewer may be sent the next picture."""
+        loop = asyncio.get_running_loop()
+        while len(self._under_way) >= LEVELS[self._level].under_way:
+            self._acknowledged.clear()
+            await self._acknowledged.wait()
+        await asyncio.sleep(max(0.0, self._due - loop.time()))
+
+    def sent(self, sequence: int, now: float) -> None:
+        """A picture is on its way."""
+        self._under_way.pop(sequence, None)
+        self._under_way[sequence] = now
+        # Half an interval of grace: the camera's beat and ours do not agree.
+        interval = 1 / LEVELS[self._level].rate_hz
+        self._due = max(self._due + interval, now + interval / 2)
+
+    def acknowledge(self, sequence: int, now: float) -> None:
+        """The viewer has shown this picture, and shows none that was sent before it any more."""
+        sent = self._under_way.get(sequence)
+        if sent is None:
+            return
+        # By the order of sending: a camera that starts anew counts from the beginning.
+        for earlier in tuple(self._under_way):
+            del self._under_way[earlier]
+            if earlier == sequence:
+                break
+        self._acknowledged.set()
+        took = now - sent
+        waited = took - self._quickest(took, now)
+        if sent >= self._judged_from:
+            self._judge(waited, now)
+
+    def _judge(self, waited: float, now: float) -> None:
+        self._late = self._late + 1 if waited > LATE_S else 0
+        if waited > QUICK_S:
+            self._quick_since = None
+        elif self._quick_since is None:
+            self._quick_since = now
+        if self._late >= LATE_IN_A_ROW and self._level + 1 < len(LEVELS):
+            if now - self._raised_at < self._steady:
+                self._steady = min(2 * self._steady, LONGEST_STEADY_S)
+            self._go(self._level + 1, now)
+        elif self._quick_since is not None and now - self._quick_since >= self._steady:
+            if now - self._raised_at > LONGEST_STEADY_S:
+                self._steady = STEADY_S
+            if self._level:
+                self._raised_at = now
+                self._go(self._level - 1, now)
+
+    def _go(self, level: int, now: float) -> None:
+        self._level = level
+        self._judged_from = now
+        self._late = 0
+        self._quick_since = None
+
+
+def acknowledged(text: str | None) -> int | None:
+    """The picture that a viewer's message acknowledges; None: it is no acknowledgement."""
+    if text is None or len(text) > MAX_ACK:
+        return None
+    try:
+        message = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(message, dict) or message.get("type") != "shown":
+        return None
+    sequence = message.get("seq")
+    return sequence if type(sequence) is int else None

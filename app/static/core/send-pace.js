@@ -1,0 +1,97 @@
+// How many webcam frames go up, and how large: what the answers to them allow.
+
+const LATE_MS = 100; // an answer that comes this much later than the quickest one waited in a queue
+const QUICK_MS = 50;
+const LATE_IN_A_ROW = 2;
+const STEADY_MS = 3000; // so long answers must be quick before more is tried
+const LONGEST_STEADY_MS = 60000;
+const WINDOW_MS = 30000; // the quickest answer is that of this window and the one before it
+
+/**
+ * What to send, the best first: quality goes down first, then size, then rate. `halved` frames have
+ * the size at which the server works anyway. At fewer than ten a second a gesture would be seen too
+ * late, and a command lives 250 ms.
+ */
+export const LEVELS = Object.freeze([
+    { quality: 0.8, halved: false, intervalMs: 0 },
+    { quality: 0.6, halved: false, intervalMs: 0 },
+    { quality: 0.7, halved: true, intervalMs: 0 },
+    { quality: 0.5, halved: true, intervalMs: 0 },
+    { quality: 0.5, halved: true, intervalMs: 66 },
+    { quality: 0.5, halved: true, intervalMs: 100 },
+]);
+
+/**
+ * Told of every frame that was sent and answered, it says which of LEVELS is in force. Goes down as
+ * soon as two answers in a row were late against the quickest of the last minute (a long way is no
+ * queue), and up a step when all were quick for three seconds; a step that proves too much is tried
+ * again after twice as long. The server paces its pictures alike (app/gateway/picture_pace.py).
+ * Times are in ms on performance.now().
+ */
+export class SendPace {
+    #level = 0;
+    #judgedFrom = -Infinity; // frames sent before this say nothing about the present level
+    #windowFrom = -Infinity;
+    #quickest = [Infinity, Infinity]; // of this window and the one before
+    #late = 0;
+    #quickSince = null;
+    #steady = STEADY_MS;
+    #raisedAt = -Infinity;
+
+    get level() {
+        return this.#level;
+    }
+
+    get wanted() {
+        return LEVELS[this.#level];
+    }
+
+    /** A frame was answered, or given up. */
+    answered(sentAt, now) {
+        const took = now - sentAt;
+        if (now - this.#windowFrom > WINDOW_MS) {
+            this.#windowFrom = now;
+            this.#quickest = [Infinity, this.#quickest[0]];
+        }
+        this.#quickest[0] = Math.min(this.#quickest[0], took);
+        if (sentAt < this.#judgedFrom) return;
+        const waited = took - Math.min(...this.#quickest);
+        this.#late = waited > LATE_MS ? this.#late + 1 : 0;
+        if (waited > QUICK_MS) this.#quickSince = null;
+        else this.#quickSince ??= now;
+        if (this.#late >= LATE_IN_A_ROW) this.#lower(now);
+        else if (this.#quickSince !== null && now - this.#quickSince >= this.#steady) {
+            this.#raise(now);
+        }
+    }
+
+    /** Another connection, perhaps another way: what was quickest is not known any more. */
+    forget() {
+        this.#windowFrom = -Infinity;
+        this.#quickest = [Infinity, Infinity];
+        this.#late = 0;
+        this.#quickSince = null;
+    }
+
+    #lower(now) {
+        if (this.#level + 1 === LEVELS.length) return;
+        if (now - this.#raisedAt < this.#steady) {
+            this.#steady = Math.min(2 * this.#steady, LONGEST_STEADY_MS);
+        }
+        this.#go(this.#level + 1, now);
+    }
+
+    #raise(now) {
+        if (now - this.#raisedAt > LONGEST_STEADY_MS) this.#steady = STEADY_MS;
+        if (this.#level === 0) return;
+        this.#raisedAt = now;
+        this.#go(this.#level - 1, now);
+    }
+
+    #go(level, now) {
+        this.#level = level;
+        this.#judgedFrom = now;
+        this.#late = 0;
+        this.#quickSince = null;
+    }
+}
