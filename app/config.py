@@ -231,7 +231,7 @@ class AgreementSettings(_Section):
         "proportion less",
     )
     max_strangeness: float = Field(
-        default=0.95,
+        default=0.85,
         ge=0.0,
         le=1.0,
         description="a gesture starts only when its frames are in the mean no stranger than this; "
@@ -479,7 +479,10 @@ class GatewaySettings(_Section):
     max_bad_messages: int = Field(
         default=10, ge=1, le=1000, description="bad messages in a row that close a session (1007)"
     )
-    max_sessions: int = Field(default=32, ge=1, le=1000, description="operator sessions at once")
+    max_sessions: int = Field(default=32, ge=1, le=1000, description="operators' sessions at once")
+    max_observers: int = Field(
+        default=100, ge=0, le=10_000, description="observers' sessions at once"
+    )
     max_frame_age_ms: int = Field(
         default=500,
         ge=50,

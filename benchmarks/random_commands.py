@@ -23,7 +23,6 @@ from app.robot.arm import Reading, Vector
 from app.robot.controller import DT, Controller, tick_of
 from app.robot.latch import StopLatch
 from app.robot.models import model_assets
-from app.robot.motion.guard import Margin
 from app.robot.sim.kinematics import SerialKinematics
 from app.robot.sim.proximity import SimulatedProximity
 from benchmarks.report import arguments, report
@@ -105,7 +104,6 @@ class Fuzz:
         self._epoch = 0
         self._sequence = 0
         self._hold = 0
-        self._margins: dict[tuple[str, str], Margin] = {}
         self._ready()
 
     def close(self) -> None:
@@ -250,17 +248,19 @@ class Fuzz:
         for name, parts in used.items():
             self.part[name] = max(self.part[name], float(parts.max()))
             self._check(name, float(parts.max()), 1.001)
-        if now.position is before.position and self._margins:
+        if now.position is before.position:
             return
-        here = {each.pair: each for each in motion.guard.margins(now.position)}
-        for pair, margin in here.items():
+        # The step alone is judged: both distances with the fingers, and what they hold, where they
+        # are now. How near fingers come by opening and closing is a matter of force (contact.py).
+        last = {
+            each.pair: each.distance - each.stop for each in motion.guard.margins(before.position)
+        }
+        for margin in motion.guard.margins(now.position):
             room = margin.distance - margin.stop
-            last = self._margins.get(pair)
-            floor = 0.0 if last is None else min(0.0, last.distance - last.stop)
+            floor = min(0.0, last.get(margin.pair, 0.0))
             if margin.kind in self.least and floor == 0.0:
                 self.least[margin.kind] = min(self.least[margin.kind], room)
             self._check(f"distance ({margin.kind})", floor - room, _ROUNDING, str(margin))
-        self._margins = here
 
     def _check(self, what: str, value: float, most: float, detail: str = "") -> None:
         if not value <= most:  # also NaN

@@ -15,9 +15,9 @@ from app.gateway.lease_keeper import check_reply
 from app.gateway.metrics import Metrics
 from app.gateway.numbers import Counter
 from app.gateway.operator_ws import tell_robot, watch_gallery
+from app.gateway.people import People
 from app.gateway.relay import Relay
 from app.gateway.robot_port import RobotPort
-from app.gateway.session import OperatorSession
 from app.gateway.viser_scene import ViserScene
 from app.gestures import GestureStore
 from app.link.messages import LeaseReply, LeaseRequest, StopRequest
@@ -64,7 +64,8 @@ class Hub:
         self.metrics = Metrics()
         self.metrics.add_live(self._live_values)
         self.holds = Counter()
-        self.sessions: set[OperatorSession] = set()
+        limits = settings.gateway
+        self.people = People(robot, limits.max_sessions, limits.max_observers)
         self.relay = Relay(robot, lambda name: self.metrics.pictures.labels(name).inc())
         self.closing = asyncio.Event()
         self.checking = asyncio.Lock()
@@ -206,7 +207,7 @@ class Hub:
             "version": self.gallery.current.version,
             "problem": self.keeper.problem,
         }
-        for session in tuple(self.sessions):
+        for session in tuple(self.people.sessions):
             session.outbox.put(message)
 
     def _live_values(self) -> Iterable[tuple[str, str, float | None]]:
@@ -216,7 +217,7 @@ class Hub:
         yield "farhand_robot_state_age_seconds", "Age of the newest state", robot.age_s
         yield "farhand_robot_restarts", "Starts of the node after its first", float(robot.restarts)
         yield "farhand_camera_viewers", "Who looks at camera pictures", float(self.relay.viewers)
-        yield "farhand_sessions", "Operator sessions open", float(len(self.sessions))
+        yield "farhand_sessions", "Operator sessions open", float(len(self.people.sessions))
         yield (
             "farhand_gestures",
             "Gestures enrolled",

@@ -26,9 +26,12 @@ CLIENT_MESSAGES = (
     "speed",
     "picture",
     "ping",
+    "ask_control",
+    "keep_control",
+    "hand_over",
 )
-SERVER_MESSAGES = ("hello", "frame", "gesture", "robot", "gallery", "pong", "error")
-NEWEST_WINS = frozenset({"frame", "robot", "gallery", "pong"})
+SERVER_MESSAGES = ("hello", "frame", "gesture", "robot", "gallery", "people", "pong", "error")
+NEWEST_WINS = frozenset({"frame", "robot", "gallery", "people", "pong"})
 
 
 class _ClientMessage(BaseModel):
@@ -45,7 +48,16 @@ class TakeControl(_ClientMessage):
 class Plain(_ClientMessage):
     """A request without values."""
 
-    type: Literal["release_control", "arm", "disarm", "stop", "reset"]
+    type: Literal[
+        "release_control", "ask_control", "keep_control", "arm", "disarm", "stop", "reset"
+    ]
+
+
+class HandOver(_ClientMessage):
+    """Give control to a session that asked for it."""
+
+    type: Literal["hand_over"]
+    to: str = Field(min_length=1, max_length=40, description="its name")
 
 
 class View(_ClientMessage):
@@ -78,7 +90,7 @@ class Ping(_ClientMessage):
 
 
 ClientMessage = Annotated[
-    TakeControl | Plain | View | Speed | Picture | Ping, Field(discriminator="type")
+    TakeControl | Plain | HandOver | View | Speed | Picture | Ping, Field(discriminator="type")
 ]
 _CLIENT_MESSAGE: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)
 

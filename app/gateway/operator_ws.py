@@ -26,11 +26,12 @@ async def operator_socket(socket: WebSocket) -> None:
     """``/ws/operator``."""
     hub: Hub = socket.app.state.hub
     await socket.accept()
-    if len(hub.sessions) >= hub.settings.gateway.max_sessions:
-        await socket.close(CLOSE_FULL, "too many sessions are open")
-        return
     identity = identity_of(socket.scope)
-    session = OperatorSession(hub, socket, identity.role if identity else "observer")
+    role = identity.role if identity else "observer"
+    if (full := hub.people.why_full(role)) is not None:
+        await socket.close(CLOSE_FULL, full)
+        return
+    session = OperatorSession(hub, socket, role)
     # OSError: the connection broke while we were sending.
     with contextlib.suppress(WebSocketDisconnect, OSError):
         await session.run()
@@ -42,13 +43,14 @@ async def tell_robot(hub: "Hub") -> None:
     loop = asyncio.get_running_loop()
     due = loop.time()
     while True:
-        if hub.sessions:
+        if hub.people.sessions:
+            hub.people.saw_driver()
             try:
                 text = encode(robot_message(hub.robot))
             except ValueError:
                 log.exception("the robot's state cannot be told")
             else:
-                for session in tuple(hub.sessions):
+                for session in tuple(hub.people.sessions):
                     session.outbox.put_text("robot", text)
         due = max(due + period, loop.time())
         await asyncio.sleep(due - loop.time())

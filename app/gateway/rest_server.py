@@ -37,7 +37,7 @@ async def health(request: Request) -> dict[str, Any]:
         "version": hub.version,
         "database": database,
         "gestures": len(hub.gallery.current.actions),
-        "sessions": len(hub.sessions),
+        "sessions": len(hub.people.sessions),
         "camera_viewers": hub.relay.viewers,
         "viser": hub.viser is not None,
         "robots": [

@@ -17,6 +17,7 @@ from app.gateway.frame_job import FrameDone, FrameJob, FrameWorker
 from app.gateway.lease_keeper import LeaseKeeper
 from app.gateway.messages import (
     ClientMessage,
+    HandOver,
     Picture,
     Ping,
     Speed,
@@ -78,7 +79,7 @@ class OperatorSession:
 
     def __init__(self, hub: "Hub", socket: WebSocket, role: Role = "operator") -> None:
         self.name = f"{role}-{secrets.token_hex(3)}"
-        self._role: Role = role
+        self.role: Role = role
         self.outbox = Outbox()
         self._hub = hub
         self._socket = socket
@@ -105,7 +106,7 @@ class OperatorSession:
     async def run(self) -> None:
         """Serve until either side ends; then give the lease back."""
         self.outbox.put(self._hello())
-        self._hub.sessions.add(self)
+        self._hub.people.add(self)
         tasks = [
             asyncio.create_task(work, name=f"{self.name}-{what}")
             for what, work in (
@@ -119,7 +120,7 @@ class OperatorSession:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             await self._end(done.pop())
         finally:
-            self._hub.sessions.discard(self)
+            self._hub.people.discard(self)
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
@@ -154,7 +155,7 @@ class OperatorSession:
         return {
             "type": "hello",
             "tick": self._opened_tick,
-            "role": self._role,
+            "role": self.role,
             "robot": self._hub.robot.id,
             "session": self.name,
             "version": self._hub.version,
@@ -204,7 +205,7 @@ class OperatorSession:
         """
         header = FrameHeader.unpack(message)
         seq = header.sequence
-        if not may_send(FRAME, self._role):
+        if not may_send(FRAME, self.role):
             raise NotAllowed("an observer's frames are not looked at", seq=seq)
         jpeg = message[HEADER_SIZE:]
         try:
@@ -264,8 +265,8 @@ class OperatorSession:
 
     def _take_text(self, text: str) -> None:
         message = parse_client_message(text)
-        if not may_send(message.type, self._role):
-            self._tell(NotAllowed(OPERATORS_ONLY))
+        if not may_send(message.type, self.role):
+            self.tell(NotAllowed(OPERATORS_ONLY))
             return
         match message:
             case Ping():
@@ -276,7 +277,7 @@ class OperatorSession:
                 self._scale = message.scale
             case Picture():
                 self._pictures.saw(message.camera, message.tick)
-            case TakeControl():
+            case TakeControl() | HandOver():
                 self._queue(message)
             case _ if message.type == "stop":
                 self._begin_stop("the stop button was pressed", "button")
@@ -287,7 +288,7 @@ class OperatorSession:
         try:
             self._requests.put_nowait(message)
         except asyncio.QueueFull:
-            self._tell(Busy("the robot has not answered the requests before this one yet"))
+            self.tell(Busy("the robot has not answered the requests before this one yet"))
 
     # Working
 
@@ -345,7 +346,7 @@ class OperatorSession:
         try:
             await self._hub.stop(self.name, reason)
         except FarhandError as error:
-            self._tell(error)
+            self.tell(error)
 
     async def _answer_requests(self) -> None:
         while True:
@@ -353,15 +354,22 @@ class OperatorSession:
             try:
                 await self._request(message)
             except FarhandError as error:
-                self._tell(error)
+                self.tell(error)
 
     async def _request(self, message: ClientMessage) -> None:
         if isinstance(message, TakeControl):
-            await self._leases.take(takeover=message.takeover)
+            await self.take(takeover=message.takeover)
+            return
+        if isinstance(message, HandOver):
+            await self._hub.people.hand_over(self, message.to)
             return
         match message.type:
             case "release_control":
-                await self._leases.release()
+                await self.give_up()
+            case "ask_control":
+                self._hub.people.ask(self)
+            case "keep_control":
+                self._hub.people.keep(self)
             case "arm":
                 self._hub.check_gestures()
                 await self._leases.arm(armed=True)
@@ -369,6 +377,14 @@ class OperatorSession:
                 await self._leases.arm(armed=False)
             case "reset":
                 await self._hub.reset(self.name)
+
+    async def take(self, *, takeover: bool = False) -> None:
+        """Become the one who drives; raises what :meth:`LeaseKeeper.take` does."""
+        await self._leases.take(takeover=takeover)
+
+    async def give_up(self) -> None:
+        """Give control back; raises what :meth:`LeaseKeeper.release` does."""
+        await self._leases.release()
 
     # Writing
 
@@ -379,11 +395,12 @@ class OperatorSession:
                 raise _Closing(CLOSE_TOO_SLOW, "the browser reads too slowly")
             await self._socket.send_text(text)
 
-    def _tell(self, error: FarhandError, seq: int | None = None) -> None:
+    def tell(self, error: FarhandError, seq: int | None = None) -> None:
+        """Send an ``error`` message."""
         self.outbox.put(error_message(error, seq))
 
     def _lease_lost(self, error: FarhandError) -> None:
-        self._tell(error)
+        self.tell(error)
 
     # Counting what is bad
 
@@ -392,7 +409,7 @@ class OperatorSession:
         if seq is not None:
             self._hub.metrics.frames.labels("refused").inc()
         error.detail.pop("seq", None)
-        self._tell(error, seq)
+        self.tell(error, seq)
         self._last_bad = max(self._last_bad, arrival)
         self._bad_in_a_row += 1
         limit = self._settings.gateway.max_bad_messages

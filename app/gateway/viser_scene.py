@@ -5,8 +5,6 @@ the scene only while somebody looks. viser's own server runs in a further thread
 either shows in the log and stops nothing else.
 """
 
-import contextlib
-import io
 import logging
 import threading
 import time
@@ -35,11 +33,6 @@ CAMERA_POSITION = (2.0, -1.6, 1.55)
 CAMERA_LOOK_AT = (0.25, 0.0, 0.6)
 """m, in the robot's base frame: from the front right, the table and the whole arm in view."""
 BACKGROUND = (0.80, 0.84, 0.88)
-
-
-def _quiet() -> contextlib.redirect_stdout[io.StringIO]:
-    """Quiet: viser prints its address and its end; standard output is for our link alone."""
-    return contextlib.redirect_stdout(io.StringIO())
 
 
 DETAIL_M = 0.002
@@ -101,14 +94,16 @@ class ViserScene:
         self._ending.set()
         self._thread.join(timeout=1.0)
         if self._server is not None:
-            with _quiet():
-                self._server.stop()
+            self._server.stop()
 
     def _start(self) -> None:
+        import rich
         import viser
 
-        with _quiet():
-            server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        # viser prints by rich's console. Standard output is for our link alone, and may be written
+        # at this very moment: so not redirected.
+        rich.reconfigure(quiet=True)
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         # What does not depend on the robot: ground, the first view, no panels.
         server.gui.configure_theme(show_logo=False, show_share_button=False)
         server.gui.main_panel.minimize()

@@ -18,6 +18,7 @@ import { keys } from "./ui/keys.js";
 import { Notices } from "./ui/notices.js";
 import { operatorView, sourceChoices } from "./ui/operator-view.js";
 import { isDriving, keepRootClasses, preparePage } from "./ui/page.js";
+import { askingNotice, takeOverContent } from "./ui/people.js";
 import { preflightContent } from "./ui/preflight.js";
 import { readout } from "./ui/readout.js";
 import { sentence } from "./ui/sentence.js";
@@ -63,11 +64,12 @@ let lastError = null;
 const root = document.documentElement;
 const sheets = new Sheets(byId("sheets"));
 const notices = new Notices(byId("notices"));
+askingNotice(byId("asking"), store);
 keepRootClasses(root, store);
 statePill(byId("state-pill"), store);
 driver(byId("driver"), store);
 connection(byId("connection"), store);
-goneOverlay(byId("gone"), store, (kind) => goneContent(kind, () => link.retryNow()));
+goneOverlay(byId("gone"), store, (kind, why) => goneContent(kind, why, () => link.retryNow()));
 steps(byId("steps"), store);
 dockButtons(byId("dock-buttons"), store);
 stopButton(byId("stop"), store);
@@ -144,7 +146,10 @@ link.addEventListener("message", ({ detail: message }) => {
     else if (message.type === "robot") {
         stopper.saw(message);
         if (drove && !isDriving(store.state) && !releasing) notices.show(texts.notices.lostControl);
-        if (!isDriving(store.state)) releasing = false;
+        if (asked && isDriving(store.state)) {
+            asked = false;
+            notices.show(texts.people.yours, { kind: "good", name: "control" });
+        }
         describeRobot();
     } else if (message.type === "frame") sender.answered(message.seq);
     else if (message.type === "gallery") loadGestures();
@@ -167,6 +172,7 @@ function greeted() {
 
 function refused(message) {
     lastError = message;
+    if (message.code === "control_kept") asked = false;
     if (Number.isFinite(message.seq) && message.seq !== null) {
         sender.answered(message.seq);
         return; // a single frame; the next one comes at once
@@ -274,10 +280,21 @@ setInterval(captionClip, 150);
 
 // What the person wants
 
-let releasing = false;
+let releasing = false; // control was given back, so that losing it is no news
+let asked = false; // for control, of whoever drives
 
 function takeControl(takeover = false) {
+    releasing = false;
     link.send("take_control", takeover ? { takeover: true } : {});
+}
+
+function askControl() {
+    const { robot } = store.state;
+    releasing = false;
+    asked = link.send("ask_control");
+    if (asked && robot && robot.controller) {
+        notices.show(texts.people.asked(robot.controller), { name: "control" });
+    }
 }
 
 function toggleControl() {
@@ -287,16 +304,15 @@ function toggleControl() {
         releasing = true;
         link.send("release_control");
     } else if (robot.controller) {
-        const take = () => {
+        const then = (go) => () => {
             sheets.close();
-            takeControl(true);
+            go();
         };
-        const content = askContent(
-            texts.takeOver.words(robot.controller),
-            texts.actions.takeOver,
-            take,
-            () => sheets.close(),
-        );
+        const content = takeOverContent(robot.controller, {
+            ask: then(askControl),
+            take: then(() => takeControl(true)),
+            cancel: then(() => {}),
+        });
         sheets.show("take-over", texts.takeOver.title, content);
     } else takeControl();
 }
@@ -406,6 +422,11 @@ const wishes = {
     source: chooseSource,
     swap: () => views.swap(),
     "toggle-control": toggleControl,
+    "keep-control": () => link.send("keep_control"),
+    "hand-over": ({ to }) => {
+        releasing = true;
+        link.send("hand_over", { to });
+    },
     "toggle-arm": toggleArm,
     "toggle-fine": () => {
         if (isDriving(store.state)) setSpeed({ fine: !store.state.fine });

@@ -146,9 +146,8 @@ def test_without_control_nothing_is_commanded_and_the_reason_says_so(
         assert frame["reason"] == "nobody has control: take control first"
         with server.operator() as other:
             take_and_arm(other)
-            frame = operator.show(hand("left"))
-            name = other.hello["session"]
-            assert frame["reason"] == f"you do not have control: {name} drives"
+            reason = f"you do not have control: {other.hello['session']} drives"
+            show_until(operator, hand("left"), lambda frame: frame["reason"] == reason)
     assert [command for command in node.commands if command.action] == []
 
 
@@ -493,7 +492,7 @@ def test_a_stop_gesture_counts_although_the_browser_goes_at_once(
         while not seen.wait(0.03):
             operator.frame(hand("stop"))
     try:
-        wait_for(lambda: not server.hub.sessions, "the session to end")
+        wait_for(lambda: not server.hub.people.sessions, "the session to end")
     finally:
         go_on.set()
     wait_for(lambda: node.stops, "the stop")
@@ -552,7 +551,8 @@ def test_too_many_sessions_are_turned_away(node: StandIn, folder: Path) -> None:
                 server.operator()
             assert closed.value.rcvd is not None
             assert closed.value.rcvd.code == 1013
-        wait_for(lambda: not server.hub.sessions, "the session to be over")
+            assert "1 operator is here already" in closed.value.rcvd.reason
+        wait_for(lambda: not server.hub.people.sessions, "the session to be over")
         server.operator().close()
 
 

@@ -106,6 +106,7 @@ def test_the_limits_are_the_settings() -> None:
     assert (LIKELY, POSSIBLE) == (0.9, 0.7)
     assert settings.gateway.max_bad_messages == 10
     assert settings.gateway.max_sessions == 32
+    assert settings.gateway.max_observers == 100
     assert settings.gateway.max_frame_age_ms == 500
     assert settings.gateway.stop_confirm_ms == 300
     assert settings.gateway.picture_wait_s == 2.0

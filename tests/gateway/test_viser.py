@@ -1,5 +1,6 @@
 """The 3D view behind the gateway, with the real viser and the real model."""
 
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import viser
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from app.gateway.viser_aids import box_edges
+from app.gateway.viser_scene import ViserScene
 from tests.gateway.running import NEAR, Running, StandIn, running, settings_for, wait_for
 
 PROTOCOL = f"viser-v{viser.__version__}"
@@ -63,6 +65,20 @@ def test_a_client_of_another_version_is_closed_as_viser_says(with_viser: Running
         socket.recv(timeout=20)
     assert closed.value.rcvd is not None
     assert closed.value.rcvd.code == 1002
+
+
+def test_standard_output_is_left_to_the_link(
+    server: Running, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = sys.stdout
+    scene = ViserScene(server.hub.robot, None)
+    try:
+        while scene.wait_port(0.001) is None:
+            # Redirecting it would swallow what another thread prints now.
+            assert sys.stdout is out
+    finally:
+        scene.close()
+    assert capfd.readouterr().out == ""
 
 
 def test_a_view_that_is_off_is_told(server: Running) -> None:

@@ -12,6 +12,7 @@ export const INITIAL_STATE = Object.freeze({
     detail: null, // newest masks, template and distances
     detailAt: -Infinity,
     gesture: null, // newest `gesture` message
+    people: null, // newest `people` message
     gestures: [],
     gesturesState: "loading",
     galleryVersion: 0,
@@ -36,6 +37,8 @@ export function changesFor(message, state, now) {
         }
         case "gesture":
             return { gesture: message };
+        case "people":
+            return { people: message };
         case "robot": {
             const mine = state.hello && message.controller === state.hello.session;
             const wasArmed = Boolean(mine && (state.wasArmed || message.armed));

@@ -12,6 +12,9 @@ export const CLIENT_MESSAGES = Object.freeze([
     "speed",
     "picture",
     "ping",
+    "ask_control",
+    "keep_control",
+    "hand_over",
 ]);
 
 /** Types of the text messages that the server sends. */
@@ -21,6 +24,7 @@ export const SERVER_MESSAGES = Object.freeze([
     "gesture",
     "robot",
     "gallery",
+    "people",
     "pong",
     "error",
 ]);

@@ -12,8 +12,9 @@ export function socketUrl(path) {
 }
 
 /**
- * Events: `state` (detail: {state, retryAt, code}) where state is "closed", "connecting", "open" or
- * "waiting" (for the next try, at `retryAt` on performance.now()); and `message` (detail: data).
+ * Events: `state` (detail: {state, retryAt, code, reason}) where state is "closed", "connecting",
+ * "open" or "waiting" (for the next try, at `retryAt` on performance.now()); and `message` (detail:
+ * data).
  * A socket that says nothing for `silenceMs` counts as dead: a pulled plug sends no close.
  */
 export class ReconnectingSocket extends EventTarget {
@@ -85,7 +86,7 @@ export class ReconnectingSocket extends EventTarget {
             this.#delay = FIRST_DELAY_MS;
             this.dispatchEvent(new CustomEvent("message", { detail: event.data }));
         };
-        socket.onclose = (event) => this.#lost(event.code);
+        socket.onclose = (event) => this.#lost(event.code, event.reason);
         this.#watch = setInterval(() => this.#checkSilence(), 500);
     }
 
@@ -95,13 +96,13 @@ export class ReconnectingSocket extends EventTarget {
         if (limit && quiet > limit) this.#lost(0);
     }
 
-    #lost(code) {
+    #lost(code, reason = "") {
         this.#drop();
         if (!this.#wanted) return;
         const wait = this.#delay * (0.8 + 0.4 * Math.random());
         this.#delay = Math.min(this.#delay * 2, LONGEST_DELAY_MS);
         this.#timer = setTimeout(() => this.#connect(), wait);
-        this.#tell("waiting", { retryAt: performance.now() + wait, code });
+        this.#tell("waiting", { retryAt: performance.now() + wait, code, reason });
     }
 
     #drop() {

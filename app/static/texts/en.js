@@ -59,6 +59,8 @@ export const texts = Object.freeze({
             "The robot stops by itself when no frames reach it. Nothing is armed when the " +
             "connection comes back.",
         retry: "Try now",
+        awayTitle: "The server has ended the connection",
+        awayWords: (why) => `It says: ${why}. This page goes on trying by itself.`,
         signedOutTitle: "You are signed out",
         signedOutWords:
             "Open the link that the server printed when it started. It signs this browser in.",
@@ -83,9 +85,21 @@ export const texts = Object.freeze({
     },
 
     takeOver: {
-        title: "Take over?",
+        title: "Somebody else drives",
         words: (name) =>
-            `${name} drives now. If you take over, the arm stops first and has to be armed again.`,
+            `${name} drives now. You can ask for control, and ${name} hands it over or drives on. ` +
+            "If you take over, the arm stops at once. Either way it has to be armed again.",
+    },
+
+    people: {
+        ask: "Ask for control",
+        asked: (name) => `${name} is asked for control.`,
+        asks: (name, more) =>
+            more > 0 ? `${name} and ${more} more ask for control.` : `${name} asks for control.`,
+        handOver: "Hand over",
+        keep: "Drive on",
+        yours: "Control is yours. Arm the robot to drive.",
+        watching: (count) => (count === 1 ? "1 other here" : `${count} others here`),
     },
 
     speed: {

@@ -19,12 +19,15 @@ export function statePill(element, store) {
 /** Who drives. */
 export function driver(element, store) {
     const words = part(element, "words");
-    store.watch(["connection", "hello", "robot"], (state) => {
+    store.watch(["connection", "hello", "robot", "people"], (state) => {
         const controller = state.robot && state.robot.controller;
         element.hidden = state.connection.state !== "open" || !state.robot;
         element.classList.toggle("is-you", isDriving(state));
-        if (isDriving(state)) setText(words, texts.driver.you);
-        else setText(words, controller ? texts.driver.other(controller) : texts.driver.nobody);
+        const who = controller ? texts.driver.other(controller) : texts.driver.nobody;
+        const { operators = 0, observers = 0 } = state.people || {};
+        const others = operators + observers - 1;
+        const here = others > 0 ? ` · ${texts.people.watching(others)}` : "";
+        setText(words, (isDriving(state) ? texts.driver.you : who) + here);
     });
 }
 
@@ -53,6 +56,7 @@ export function connection(element, store) {
     }, 500);
 }
 
+const TRY_LATER = 1013; // the close code of a server that has no room, or gave up waiting
 const OVERLAY_AFTER_MS = 1200; // a short break is not worth a curtain
 
 /** Says plainly that the server is gone. Leaves the dock with the stop button free. */
@@ -68,11 +72,14 @@ export function goneOverlay(element, store, build) {
             element.hidden = true;
             return;
         }
-        const kind = link.state === "signed-out" ? "signedOut" : "gone";
+        // A new try is no news: what is said stays until something comes of it.
+        if (link.state === "connecting" && shown) return;
+        const away = link.reason && link.code === TRY_LATER ? "away" : "gone";
+        const kind = link.state === "signed-out" ? "signedOut" : away;
         const show = () => {
             if (shown === kind) return;
             shown = kind;
-            element.replaceChildren(build(kind));
+            element.replaceChildren(build(kind, link.reason));
             element.hidden = false;
         };
         if (kind === "signedOut") show();

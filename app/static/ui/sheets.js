@@ -96,14 +96,19 @@ export function askContent(words, yesLabel, yes, no) {
 }
 
 /** What covers the cockpit while the server is gone; the dock stays free. */
-export function goneContent(kind, retry) {
+export function goneContent(kind, why, retry) {
     const { gone } = texts;
     const signedOut = kind === "signedOut";
+    const [title, words] = {
+        signedOut: [gone.signedOutTitle, gone.signedOutWords],
+        away: [gone.awayTitle, gone.awayWords(why)],
+        gone: [gone.title, gone.words],
+    }[kind];
     return el(
         "div",
         { class: "gone-card" },
-        el("p", { class: "gone-title", text: signedOut ? gone.signedOutTitle : gone.title }),
-        el("p", { text: signedOut ? gone.signedOutWords : gone.words }),
+        el("p", { class: "gone-title", text: title }),
+        el("p", { text: words }),
         button(signedOut ? gone.reload : gone.retry, {
             class: "primary",
             id: "gone-retry",
