@@ -3,7 +3,7 @@
 import asyncio
 import logging
 
-from app.errors import FarhandError
+from app.errors import DatabaseBroken, FarhandError
 from app.gestures import backup, recovery
 from app.gestures.backup import Place
 
@@ -30,18 +30,24 @@ class BackupKeeper:
         self._keep = keep
         self._latest = 0.0
         self._due: float | None = None
-        self.problem: str | None = None
+        self._lost: str | None = None
+        self._broken: str | None = None
+
+    @property
+    def problem(self) -> str | None:
         """Why the robot must not be armed, and how to go on."""
+        return self._lost or self._broken
 
-    def look(self) -> bool:
-        """Read :attr:`problem` again; reads one small file at most.
+    def look(self) -> None:
+        """Notice what another process did about a lost database; reads one small file."""
+        self._lost = None if self._place is None else recovery.problem(self._place)
 
-        Returns:
-            Whether it differs from before.
-        """
-        before = self.problem
-        self.problem = None if self._place is None else recovery.problem(self._place)
-        return self.problem != before
+    def broke(self, error: DatabaseBroken) -> None:
+        """The database broke while the server runs: a :attr:`problem` until it is started again."""
+        self._broken = (
+            f"{error.message}. The robot cannot be armed until that is mended and the server "
+            "started again."
+        )
 
     def changed(self) -> None:
         """The database holds something new."""
@@ -75,6 +81,9 @@ class BackupKeeper:
             return True
         try:
             made = backup.make(self._place, self._keep)
+        except DatabaseBroken as error:
+            self.broke(error)
+            return False
         except (FarhandError, OSError) as error:
             log.error("the gesture database was not backed up: %s", error)
             return False

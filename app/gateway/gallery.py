@@ -14,7 +14,7 @@ from app.config import PipelineSettings, Settings
 from app.errors import CannotStart
 from app.gestures import GestureStore
 from app.gestures.backup import Place
-from app.gestures.recovery import Hold, open_or_set_aside
+from app.gestures.recovery import Hold, check_there, open_or_set_aside
 from app.link.actions import Action
 from app.pipeline import Gallery, PcaMatcher, unpack_template
 from app.robot.models import load_model
@@ -40,7 +40,7 @@ def open_store(settings: Settings) -> GestureStore:
     What its gestures do may be different for a robot: see ``starter`` in its profile.
 
     Raises:
-        DatabaseBroken: it is there, but cannot be read.
+        DatabaseBroken: it cannot be read, or is gone although there are backups.
         CannotStart: the folder cannot be made or written, or the robot's profile is wrong.
     """
     url = settings.database_url
@@ -54,6 +54,9 @@ def open_store(settings: Settings) -> GestureStore:
                 path=str(settings.data_dir),
             ) from error
         url = f"sqlite:///{settings.data_dir.absolute() / DATABASE_FILE}"
+    place = place_of(settings)
+    if place is not None:
+        check_there(place)
     profile = settings.robot.profile
     actions = load_model(profile).starter if profile is not None else {}
     return GestureStore(url, starter_set(), actions)
@@ -81,7 +84,7 @@ def open_for_server(settings: Settings) -> tuple[GestureStore, Hold | None]:
 
     Raises:
         DatabaseBroken: it is broken, and another server has it open.
-        ForeignDatabase, CannotStart, StorageFull: as :func:`open_store`.
+        ForeignDatabase, CannotStart, StorageFull, WorldError: as :func:`open_store`.
     """
     place = place_of(settings)
     if place is None:

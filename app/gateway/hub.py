@@ -8,7 +8,7 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from importlib.metadata import PackageNotFoundError, version
 
 from app.config import Settings
-from app.errors import NotAllowed
+from app.errors import DatabaseBroken, NotAllowed
 from app.gateway.backup_keeper import BackupKeeper
 from app.gateway.gallery import LiveGallery, open_for_server, place_of
 from app.gateway.lease_keeper import check_reply
@@ -73,6 +73,7 @@ class Hub:
         self._link_threads = ThreadPoolExecutor(LINK_THREADS, "link")
         self._stop_threads = ThreadPoolExecutor(STOP_THREADS, "stop")
         self._told_version = gallery.current.version
+        self._told_problem = keeper.problem
 
     @classmethod
     @asynccontextmanager
@@ -184,12 +185,16 @@ class Hub:
         """Notice changes by other processes, back up what is due, tell what is wrong."""
         try:
             await self.gallery_changed()
+        except DatabaseBroken as error:
+            self.keeper.broke(error)
         finally:
-            if await asyncio.to_thread(self.keeper.look):
-                log.warning("%s", self.keeper.problem or "the gestures are accepted")
+            await asyncio.to_thread(self.keeper.look)
+            await self.keeper.tend()
+            if self.keeper.problem != self._told_problem:
+                self._told_problem = self.keeper.problem
+                log.warning("%s", self._told_problem or "the gestures are accepted")
                 self.keeper.changed()
                 self._tell_gallery()
-            await self.keeper.tend()
 
     def check_gestures(self) -> None:
         """Do nothing if the gestures are those that people taught.

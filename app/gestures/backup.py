@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 from sqlalchemy import URL
 
-from app.errors import DatabaseBroken, FarhandError, NotFound, StorageFull
+from app.errors import DatabaseBroken, FarhandError, NotFound, StorageFull, WorldError
 from app.gestures import database
 from app.gestures.store import GestureStore
 
@@ -91,7 +91,7 @@ def fingerprint(path: Path) -> Fingerprint | None:
                 " FROM gesture"
             ).fetchone()
         return Fingerprint(*row)
-    except sqlite3.Error:
+    except (sqlite3.Error, UnicodeDecodeError):
         return None
 
 
@@ -106,13 +106,13 @@ def verify(path: Path) -> int:
     Raises:
         DatabaseBroken: with what is wrong.
     """
-    if path.stat().st_size == 0:
-        raise DatabaseBroken(f"{path} is empty")
     store = GestureStore(url_of(path), None)
     try:
         gestures = store.list()
         for gesture in gestures:
             store.versions(gesture.id)
+    except (ValueError, TypeError) as error:
+        raise DatabaseBroken(f"{path} is damaged ({type(error).__name__})") from error
     finally:
         store.close()
     return len(gestures)
@@ -174,6 +174,7 @@ def copied(source: Path, folder: Path) -> Iterator[Path]:
     Raises:
         DatabaseBroken: ``source`` cannot be read.
         StorageFull: no space in ``folder``.
+        WorldError: somebody writes to ``source`` all the time.
     """
     for old in folder.glob(".copy-*"):
         # Left by a crash; a copy that is being made now is younger than its process's start.
@@ -181,6 +182,9 @@ def copied(source: Path, folder: Path) -> Iterator[Path]:
             old.unlink(missing_ok=True)
     copy = folder / f".copy-{secrets.token_hex(4)}"
     try:
+        if source.stat().st_size == 0:
+            # SQLite would take it for a new database.
+            raise DatabaseBroken(f"{source} is empty")
         os.close(os.open(copy, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600))
         with (
             contextlib.closing(_open_file(source)) as old_end,
@@ -188,10 +192,18 @@ def copied(source: Path, folder: Path) -> Iterator[Path]:
         ):
             old_end.backup(new_end)
         yield copy
+    except DatabaseBroken as error:
+        # What is wrong with the copy is wrong with what was copied, and that has a name.
+        error.message = error.message.replace(str(copy), str(source))
+        raise
     except sqlite3.Error as error:
-        if error.sqlite_errorcode in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR_WRITE):
+        if database.no_room(error, folder):
             raise StorageFull(f"no space for a copy of {source}; free some") from error
+        if getattr(error, "sqlite_errorname", "").startswith("SQLITE_BUSY"):
+            raise WorldError(f"{source} is busy; try again", code="database_busy") from error
         raise DatabaseBroken(f"{source} cannot be copied: {error}") from error
+    except UnicodeDecodeError as error:
+        raise DatabaseBroken(f"{source} cannot be copied: it is damaged") from error
     except OSError as error:
         if database.is_full(error):
             raise StorageFull(f"no space for a copy of {source}; free some") from error

@@ -182,9 +182,12 @@ def plain_errors(engine: Engine) -> Iterator[None]:
         if is_full(error):
             raise _full(name) from error
         raise
+    except UnicodeDecodeError as error:
+        # The driver passes on what SQLite says, in which a damaged name may stand.
+        raise DatabaseBroken(f"{name} is damaged (text that is not UTF-8); {GO_ON}") from error
     except DBAPIError as error:
         text = _one_line(error.orig)
-        if "is full" in text or "No space left" in text or _no_room(engine, error.orig):
+        if "is full" in text or "No space left" in text or no_room(error.orig, _folder(engine)):
             raise _full(name) from error
         if "readonly" in text or "unable to open" in text:
             raise _not_writable(name) from error
@@ -206,20 +209,26 @@ def is_full(error: OSError) -> bool:
     return error.errno in (errno.ENOSPC, errno.EDQUOT)
 
 
-def _no_room(engine: Engine, error: object) -> bool:
-    """Whether an I/O error of SQLite comes from a full disk.
+def no_room(error: object, folder: Path) -> bool:
+    """Whether an error of SQLite comes from a full disk.
 
-    SQLite says "full" of its files, and "disk I/O error" where the log's index cannot grow.
+    SQLite says "full" of its files, but "disk I/O error" where the log's index cannot grow, and
+    "unable to open" where a file cannot be made.
     """
-    if not isinstance(error, sqlite3.Error) or engine.url.database is None:
-        return False
-    if not str(getattr(error, "sqlite_errorname", "")).startswith("SQLITE_IOERR"):
+    name = str(getattr(error, "sqlite_errorname", ""))
+    if name.startswith("SQLITE_FULL"):
+        return True
+    if not name.startswith(("SQLITE_IOERR", "SQLITE_CANTOPEN")):
         return False
     try:
-        room = os.statvfs(Path(engine.url.database).parent)
+        room = os.statvfs(folder)
     except OSError:
         return False
     return room.f_bavail * room.f_frsize < NO_ROOM_BYTES
+
+
+def _folder(engine: Engine) -> Path:
+    return Path(engine.url.database or ".").parent
 
 
 def _full(name: str) -> StorageFull:

@@ -10,6 +10,7 @@ import json
 import logging
 import os
 import secrets
+import shlex
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,20 +19,17 @@ from typing import NamedTuple
 from app.errors import (
     CannotStart,
     DatabaseBroken,
-    FarhandError,
     ForeignDatabase,
     NotFound,
     StorageFull,
+    WorldError,
 )
 from app.gestures.backup import Place, copied, files_of, found, newest_good, stamp, sync, verify
+from app.gestures.database import GO_ON, is_full
 from app.gestures.store import GestureStore
 
 log = logging.getLogger(__name__)
 
-HOW = (
-    "To bring the last good backup back, end the server and run `farhand gestures restore`; to "
-    "keep the new gestures, run `farhand gestures restore --accept-new`"
-)
 _MAGIC = b"SQLite format 3\0"
 
 
@@ -42,6 +40,15 @@ class Restored(NamedTuple):
     gestures: int
     kept: tuple[Path, ...]
     """Where what was replaced lies now."""
+
+
+def how(place: Place) -> str:
+    """What to do about a lost database, as one sentence without its full stop."""
+    restore = f"farhand gestures restore --data-dir {shlex.quote(str(place.backups.parent))}"
+    return (
+        f"To bring the last good backup back, end the server and run `{restore}`; to keep the "
+        f"starter gestures, run `{restore} --accept-new`"
+    )
 
 
 def problem(place: Place) -> str | None:
@@ -56,7 +63,7 @@ def problem(place: Place) -> str | None:
         return None
     except (OSError, ValueError, KeyError, TypeError):
         what = "The gesture database was lost."  # in doubt the arm stands still
-    return f"{what} The starter gestures are in use and the robot cannot be armed. {HOW}."
+    return f"{what} The starter gestures are in use and the robot cannot be armed. {how(place)}."
 
 
 class Hold:
@@ -64,6 +71,7 @@ class Hold:
 
     Raises:
         CannotStart: it is being restored, or the file that says so cannot be written.
+        StorageFull: no space for that file.
     """
 
     def __init__(self, place: Place) -> None:
@@ -99,31 +107,24 @@ def open_or_set_aside(place: Place, hold: Hold, make: Callable[[], GestureStore]
     Args:
         place: Of the database.
         hold: Of this server.
-        make: Opens the database, or makes it.
+        make: Opens the database, or makes it; after :func:`check_there`.
 
     Raises:
         DatabaseBroken: it is broken, and another server has it open.
         ForeignDatabase: it is of a newer Farhand or of something else.
-        CannotStart, StorageFull: as :class:`GestureStore`.
+        CannotStart, StorageFull, WorldError: as :class:`GestureStore`.
     """
     with hold.alone() as alone:
-        error = _lost(place)
-        if error is None:
-            try:
-                return make()
-            except (ForeignDatabase, CannotStart, StorageFull):
-                raise
-            except FarhandError as caught:
-                if not isinstance(caught, DatabaseBroken) and caught.code == "database_busy":
-                    raise
-                error = caught
-            except Exception as caught:
-                # Damage shows in many ways: a date that is none, text that is not UTF-8.
-                log.exception("%s cannot be opened", place.database)
-                error = DatabaseBroken(f"it cannot be opened ({type(caught).__name__})")
-        if not alone:
-            raise DatabaseBroken(f"{error.message}. Another server has it open: end that one first")
-        set_aside(place, error.message)
+        try:
+            return make()
+        except ForeignDatabase:
+            raise
+        except DatabaseBroken as error:
+            if not alone:
+                raise DatabaseBroken(
+                    f"{error.message}. Another server has it open: end that one first"
+                ) from error
+            set_aside(place, error.message)
         return make()
 
 
@@ -134,7 +135,7 @@ def set_aside(place: Place, why: str) -> tuple[Path, ...]:
         Where its files lie now; none when there were none.
 
     Raises:
-        StorageFull: not even a line can be written; nothing was moved.
+        CannotStart, StorageFull: not even a line can be written; nothing was moved.
     """
     name = f"{place.database.name}.broken-{stamp()}Z"
     is_there = place.database.exists()
@@ -146,7 +147,7 @@ def set_aside(place: Place, why: str) -> tuple[Path, ...]:
     # First the note: whatever breaks off after it, the robot is not armed.
     _write(place.marker, json.dumps({"what": what, "why": why}) + "\n")
     moved = _move(place.database, name)
-    log.error("%s %s %s (%s)", what, HOW, "The robot cannot be armed until then.", why)
+    log.error("%s (%s) The robot cannot be armed. %s.", what, why, how(place))
     return moved
 
 
@@ -191,24 +192,28 @@ def accept(place: Place) -> bool:
     return True
 
 
-def _lost(place: Place) -> FarhandError | None:
-    """What is wrong with the file as far as SQLite would not call it broken."""
+def check_there(place: Place) -> None:
+    """Find what SQLite would not call broken: an empty or missing file, a damaged first page.
+
+    Raises:
+        DatabaseBroken: the file is no database, or is gone although there are backups.
+    """
     try:
         with place.database.open("rb") as file:
             head = file.read(100)
     except FileNotFoundError:
         head = b""
     except OSError:
-        return None  # opening it says what is wrong
+        return  # opening it says what is wrong
     name = f"the gesture database {place.database}"
     if not head:
-        marked = place.marker.exists()
-        return DatabaseBroken(f"{name} is empty or gone") if found(place) and not marked else None
+        if found(place) and not place.marker.exists():
+            raise DatabaseBroken(f"{name} is empty or gone; {GO_ON}")
+        return
     # A damaged byte of the format's version would read as "read-only":
     # https://www.sqlite.org/fileformat.html#file_format_version_numbers
     if not head.startswith(_MAGIC) or not {head[18:19], head[19:20]} <= {b"\1", b"\2"}:
-        return DatabaseBroken(f"{name} is not a database")
-    return None
+        raise DatabaseBroken(f"{name} is damaged (file is not a database); {GO_ON}")
 
 
 def _move(path: Path, name: str) -> tuple[Path, ...]:
@@ -235,9 +240,7 @@ def _write(path: Path, text: str) -> None:
         sync(path.parent)
     except OSError as error:
         part.unlink(missing_ok=True)
-        raise StorageFull(
-            f"{path} cannot be written ({error.strerror}); free some space"
-        ) from error
+        raise _unwritable(path, error) from error
 
 
 def _open_lock(place: Place) -> int:
@@ -245,10 +248,16 @@ def _open_lock(place: Place) -> int:
         place.lock.parent.mkdir(parents=True, exist_ok=True)
         return os.open(place.lock, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
     except OSError as error:
-        raise CannotStart(
-            f"{place.lock} cannot be written ({error.strerror}); give this user write permission, "
-            "or choose another folder with --data-dir"
-        ) from error
+        raise _unwritable(place.lock, error) from error
+
+
+def _unwritable(path: Path, error: OSError) -> WorldError:
+    if is_full(error):
+        return StorageFull(f"the disk that holds {path} is full; free some space and try again")
+    return CannotStart(
+        f"{path} cannot be written ({error.strerror}); give this user write permission, or choose "
+        "another folder with --data-dir"
+    )
 
 
 @contextmanager
