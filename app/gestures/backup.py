@@ -201,9 +201,9 @@ def copied(source: Path, folder: Path) -> Iterator[Path]:
             raise StorageFull(f"no space for a copy of {source}; free some") from error
         if getattr(error, "sqlite_errorname", "").startswith("SQLITE_BUSY"):
             raise WorldError(f"{source} is busy; try again", code="database_busy") from error
-        raise DatabaseBroken(f"{source} cannot be copied: {error}") from error
+        raise DatabaseBroken(f"{source} is damaged ({error})") from error
     except UnicodeDecodeError as error:
-        raise DatabaseBroken(f"{source} cannot be copied: it is damaged") from error
+        raise DatabaseBroken(f"{source} is damaged (text that is not UTF-8)") from error
     except OSError as error:
         if database.is_full(error):
             raise StorageFull(f"no space for a copy of {source}; free some") from error
