@@ -279,7 +279,7 @@ def damaged(folder: Path, times: int, rng: random.Random) -> dict[str, Any]:
             continue
         worst = max(worst, seconds)
         slow += seconds > START_S
-        copies = list(place.database.parent.glob("gestures.db.broken-*"))
+        copies = list(place.database.parent.glob("gestures.db.broken-*Z"))
         if problem == "ok":
             unharmed += 1
             if there.json() != taught:
