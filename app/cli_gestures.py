@@ -8,11 +8,12 @@ import typer
 from pydantic import ValidationError
 
 from app.config import Settings
-from app.errors import CannotStart, ImageRefused, Invalid, NotFound
+from app.errors import CannotStart, FarhandError, ImageRefused, Invalid, NotFound
 from app.gestures import GestureStore
 from app.link.actions import ACTION
 
 if TYPE_CHECKING:
+    from app.gestures.backup import Place
     from app.pipeline.types import U8
 
 gestures_app = typer.Typer(help="The gesture database.", no_args_is_help=True)
@@ -99,6 +100,63 @@ def import_(
         print(f"imported; the database now holds {len(store.list())} gestures")
     finally:
         store.close()
+
+
+@gestures_app.command("backups")
+def list_backups(data_dir: DataDir = None) -> None:
+    """List the backups of the database, newest first, each checked."""
+    from app.gestures import backup
+
+    for each in backup.found(_place(data_dir)):
+        try:
+            state = f"{backup.check(each.path)} gestures"
+        except FarhandError as error:
+            state = f"damaged: {error.message}"
+        made = each.made.astimezone().strftime("%Y-%m-%d %H:%M:%S")
+        print(f"{each.path.name}  {made}  {state}")
+
+
+@gestures_app.command("restore")
+def restore(
+    backup: Annotated[
+        str | None, typer.Argument(help="A backup's name or file. Default: the last good one.")
+    ] = None,
+    accept_new: Annotated[
+        bool,
+        typer.Option("--accept-new", help="Keep the new database after a broken one was set aside"),
+    ] = False,
+    data_dir: DataDir = None,
+) -> None:
+    """Bring a backup of the database back; what it replaces is kept. Ends no server: do that first.
+
+    With --accept-new nothing is brought back: the gestures that are there now are the ones that
+    you want, and the robot may be armed again.
+    """
+    from app.gestures import recovery
+
+    place = _place(data_dir)
+    if accept_new:
+        if backup is not None:
+            raise Invalid("give a backup or --accept-new, not both")
+        done = recovery.accept(place)
+        print("the gestures that are there now are kept" if done else "nothing was set aside")
+        return
+    path = None
+    if backup is not None:
+        path = Path(backup) if "/" in backup else place.backups / backup
+    result = recovery.restore(place, path)
+    print(f"{result.gestures} gestures are back, from {result.backup}")
+    for kept in result.kept:
+        print(f"what was there before is kept as {kept}")
+
+
+def _place(data_dir: Path | None) -> "Place":
+    from app.gateway.gallery import place_of
+
+    place = place_of(settings_for(data_dir=data_dir))
+    if place is None:
+        raise Invalid("backups are made of an SQLite database; this one has its own ways")
+    return place
 
 
 @gestures_app.command("dry-run")

@@ -580,6 +580,13 @@ class Settings(BaseSettings):
     database_url: str | None = Field(
         default=None, description="SQLAlchemy URL; default: SQLite in the data folder"
     )
+    backups: int = Field(
+        default=5,
+        ge=0,
+        le=1000,
+        description="backups of an SQLite gesture database that are kept in the data folder; 0 "
+        "makes none",
+    )
     pipeline: PipelineSettings = PipelineSettings()
     robot: RobotSettings = RobotSettings()
     gateway: GatewaySettings = GatewaySettings()

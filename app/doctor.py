@@ -148,7 +148,8 @@ def check_port(settings: Settings) -> Finding:
 
 def check_database(settings: Settings) -> Finding:
     """The gesture database opens; a missing one is made from the starter set, elsewhere."""
-    from app.gateway.gallery import open_store
+    from app.gateway.gallery import open_store, place_of
+    from app.gestures.recovery import how, problem
 
     if settings.database_url is None and not settings.data_dir.exists():
         with tempfile.TemporaryDirectory() as folder:
@@ -159,6 +160,10 @@ def check_database(settings: Settings) -> Finding:
     store = open_store(settings)
     count = len(store.list())
     store.close()
+    place = place_of(settings)
+    if place is not None and problem(place) is not None:
+        lost = "the gesture database was lost; the robot cannot be armed"
+        return Finding(False, lost, how(place))
     return Finding(True, f"the gesture database holds {count} gestures")
 
 

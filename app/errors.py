@@ -18,6 +18,7 @@
     └── WorldError                the world did something wrong (HTTP 5xx, or exit code 1)
         ├── RobotUnavailable      the robot node does not answer
         ├── DatabaseBroken        the gesture database cannot be read
+        │   └── ForeignDatabase   it is sound, but of a newer Farhand or of something else
         ├── StorageFull           no space left to write to
         ├── CannotStart           a port, folder or model that is needed is missing or taken
         └── LinkFailed            the link between gateway and node cannot be opened
@@ -150,6 +151,10 @@ class DatabaseBroken(WorldError):
     """The gesture database cannot be read."""
 
     default_code = "database_broken"
+
+
+class ForeignDatabase(DatabaseBroken):
+    """A database of a newer Farhand or of something else: sound, and not ours to set aside."""
 
 
 class StorageFull(WorldError):

@@ -15,6 +15,8 @@ import pytest
 
 from app.gateway.machine import machine_names
 from app.gateway.tls import LocalAuthority
+from app.gestures import backup
+from app.gestures.backup import Place
 from app.gestures.hand import POSES, HandLook, HandView, render_hand, render_sprite
 from app.gestures.hand.render import compose
 from app.gestures.synthetic import Step, SyntheticOperator, write_mjpeg
@@ -82,6 +84,41 @@ def test_what_is_wrong_is_told_in_one_line(tmp_path: Path, photo: Path) -> None:
     for arguments, expected in cases:
         told = farhand(*arguments, fails=True).stderr.strip().splitlines()[-1]
         assert told.startswith("farhand: ") and expected in told, told
+
+
+def test_backups_are_listed_and_restored(tmp_path: Path, photo: Path) -> None:
+    data = ("--data-dir", str(tmp_path / "data"))
+    assert farhand("gestures", "backups", *data).stdout == ""
+    farhand("enroll", "wave", str(photo), "--action", '{"type":"home"}', *data)
+    place = Place(tmp_path / "data" / "gestures.db", tmp_path / "data" / "backups")
+    made = backup.make(place, 5)
+    assert made is not None
+    bad = made.with_name("gestures-20200101T000000.000000Z.db")
+    bad.write_bytes(b"\xff" * 5000)
+    first, second = farhand("gestures", "backups", *data).stdout.splitlines()
+    assert first.startswith(made.name) and first.endswith("11 gestures")
+    assert second.startswith(bad.name) and "damaged" in second
+
+    # What SQLite says about a damaged schema is no text; no command may stumble over it.
+    sound = place.database.read_bytes()
+    place.database.write_bytes(
+        sound.replace(b"CREATE TABLE sample", b"CREATE \xff\xfe\xffLE sample")
+    )
+    told = farhand("gestures", "list", *data, fails=True).stderr
+    assert "is damaged" in told and "farhand gestures restore" in told
+    assert "damaged" in farhand("gestures", "restore", bad.name, *data, fails=True).stderr
+
+    assert "11 gestures are back" in farhand("gestures", "restore", *data).stdout
+    assert "wave" in farhand("gestures", "list", *data).stdout
+    place.database.unlink()
+    # No new starter set in the place of what is lost.
+    assert "gone" in farhand("gestures", "list", *data, fails=True).stderr
+    assert "11 gestures are back" in farhand("gestures", "restore", made.name, *data).stdout
+    both = farhand("gestures", "restore", made.name, "--accept-new", *data, fails=True).stderr
+    assert "not both" in both
+    place.marker.write_text("{}")
+    assert "are kept" in farhand("gestures", "restore", "--accept-new", *data).stdout
+    assert "nothing was set aside" in farhand("gestures", "restore", "--accept-new", *data).stdout
 
 
 def test_a_photo_without_a_hand_is_refused_and_nothing_is_enrolled(

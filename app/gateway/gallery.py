@@ -7,10 +7,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from sqlalchemy import make_url
+from sqlalchemy.exc import ArgumentError
 
 from app.config import PipelineSettings, Settings
 from app.errors import CannotStart
 from app.gestures import GestureStore
+from app.gestures.backup import Place
+from app.gestures.recovery import Hold, check_there, open_or_set_aside
 from app.link.actions import Action
 from app.pipeline import Gallery, PcaMatcher, unpack_template
 from app.robot.models import load_model
@@ -18,6 +22,7 @@ from app.robot.models import load_model
 log = logging.getLogger(__name__)
 
 DATABASE_FILE = "gestures.db"
+BACKUPS = "backups"
 
 
 def starter_set() -> Path | None:
@@ -35,7 +40,7 @@ def open_store(settings: Settings) -> GestureStore:
     What its gestures do may be different for a robot: see ``starter`` in its profile.
 
     Raises:
-        DatabaseBroken: it is there, but cannot be read.
+        DatabaseBroken: it cannot be read, or is gone although there are backups.
         CannotStart: the folder cannot be made or written, or the robot's profile is wrong.
     """
     url = settings.database_url
@@ -49,9 +54,47 @@ def open_store(settings: Settings) -> GestureStore:
                 path=str(settings.data_dir),
             ) from error
         url = f"sqlite:///{settings.data_dir.absolute() / DATABASE_FILE}"
+    place = place_of(settings)
+    if place is not None:
+        check_there(place)
     profile = settings.robot.profile
     actions = load_model(profile).starter if profile is not None else {}
     return GestureStore(url, starter_set(), actions)
+
+
+def place_of(settings: Settings) -> Place | None:
+    """Where the database and its backups are; None when it is not SQLite's."""
+    database = settings.data_dir.absolute() / DATABASE_FILE
+    if settings.database_url is not None:
+        try:
+            url = make_url(settings.database_url)
+        except ArgumentError:
+            return None  # opening it says what is wrong
+        if url.get_backend_name() != "sqlite" or not url.database:
+            return None
+        database = Path(url.database).absolute()
+    return Place(database, settings.data_dir.absolute() / BACKUPS)
+
+
+def open_for_server(settings: Settings) -> tuple[GestureStore, Hold | None]:
+    """Open the database for as long as a server runs; one that is broken is set aside.
+
+    Returns:
+        The store, and what to close after it.
+
+    Raises:
+        DatabaseBroken: it is broken, and another server has it open.
+        ForeignDatabase, CannotStart, StorageFull, WorldError: as :func:`open_store`.
+    """
+    place = place_of(settings)
+    if place is None:
+        return open_store(settings), None
+    hold = Hold(place)
+    try:
+        return open_or_set_aside(place, hold, lambda: open_store(settings)), hold
+    except BaseException:
+        hold.close()
+        raise
 
 
 def fit(templates: Sequence[tuple[str, bytes]], settings: PipelineSettings) -> PcaMatcher:

@@ -8,7 +8,9 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from importlib.metadata import PackageNotFoundError, version
 
 from app.config import Settings
-from app.gateway.gallery import LiveGallery, open_store
+from app.errors import DatabaseBroken, NotAllowed
+from app.gateway.backup_keeper import BackupKeeper
+from app.gateway.gallery import LiveGallery, open_for_server, place_of
 from app.gateway.lease_keeper import check_reply
 from app.gateway.metrics import Metrics
 from app.gateway.numbers import Counter
@@ -46,6 +48,7 @@ class Hub:
         settings: Settings,
         store: GestureStore,
         gallery: LiveGallery,
+        keeper: BackupKeeper,
         robot: RobotPort,
         images: ThreadPoolExecutor,
         viser: ViserScene | None,
@@ -53,6 +56,7 @@ class Hub:
         self.settings = settings
         self.store = store
         self.gallery = gallery
+        self.keeper = keeper
         self.robot = robot
         self.images = images
         self.viser = viser
@@ -69,6 +73,7 @@ class Hub:
         self._link_threads = ThreadPoolExecutor(LINK_THREADS, "link")
         self._stop_threads = ThreadPoolExecutor(STOP_THREADS, "stop")
         self._told_version = gallery.current.version
+        self._told_problem = keeper.problem
 
     @classmethod
     @asynccontextmanager
@@ -85,8 +90,14 @@ class Hub:
             DatabaseBroken, CannotStart, LinkFailed: what is needed is not there.
         """
         async with AsyncExitStack() as stack:
-            store = await asyncio.to_thread(open_store, settings)
+            store, hold = await asyncio.to_thread(open_for_server, settings)
+            if hold is not None:
+                stack.callback(hold.close)
             stack.callback(store.close)
+            keeper = BackupKeeper(place_of(settings), settings.backups)
+            keeper.look()
+            await asyncio.to_thread(keeper.make)
+            stack.push_async_callback(asyncio.to_thread, keeper.finish)
             gallery = await asyncio.to_thread(LiveGallery, store, settings.pipeline)
             robot = RobotPort(settings)
             stack.push_async_callback(asyncio.to_thread, robot.close)
@@ -97,7 +108,7 @@ class Hub:
             if settings.gateway.viser:
                 viser = ViserScene(robot, settings.robot.profile)
                 stack.push_async_callback(asyncio.to_thread, viser.close)
-            hub = cls(settings, store, gallery, robot, images, viser)
+            hub = cls(settings, store, gallery, keeper, robot, images, viser)
             stack.push_async_callback(hub._close)
             deadline = asyncio.get_running_loop().time() + settings.gateway.ready_wait_s
             while (
@@ -167,8 +178,42 @@ class Hub:
         current = self.gallery.current.version
         if current != self._told_version:
             self._told_version = current
-            for session in tuple(self.people.sessions):
-                session.outbox.put({"type": "gallery", "version": current})
+            self.keeper.changed()
+            self._tell_gallery()
+
+    async def tend_database(self) -> None:
+        """Notice changes by other processes, back up what is due, tell what is wrong."""
+        try:
+            await self.gallery_changed()
+        except DatabaseBroken as error:
+            self.keeper.broke(error)
+        finally:
+            await asyncio.to_thread(self.keeper.look)
+            await self.keeper.tend()
+            if self.keeper.problem != self._told_problem:
+                self._told_problem = self.keeper.problem
+                log.warning("%s", self._told_problem or "the gestures are accepted")
+                self.keeper.changed()
+                self._tell_gallery()
+
+    def check_gestures(self) -> None:
+        """Do nothing if the gestures are those that people taught.
+
+        Raises:
+            NotAllowed: they were lost, and nobody has decided yet how to go on.
+        """
+        self.keeper.look()
+        if self.keeper.problem is not None:
+            raise NotAllowed(self.keeper.problem, code="gestures_lost")
+
+    def _tell_gallery(self) -> None:
+        message = {
+            "type": "gallery",
+            "version": self.gallery.current.version,
+            "problem": self.keeper.problem,
+        }
+        for session in tuple(self.people.sessions):
+            session.outbox.put(message)
 
     def _live_values(self) -> Iterable[tuple[str, str, float | None]]:
         robot = self.robot

@@ -61,6 +61,6 @@ async def watch_gallery(hub: "Hub") -> None:
     while True:
         await asyncio.sleep(GALLERY_CHECK_S)
         try:
-            await hub.gallery_changed()
+            await hub.tend_database()
         except Exception:
             log.exception("the gesture database cannot be read")

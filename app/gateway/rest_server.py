@@ -31,6 +31,7 @@ async def health(request: Request) -> dict[str, Any]:
         await asyncio.to_thread(lambda: hub.store.version)
     except FarhandError as error:
         database = error.message
+    database = hub.keeper.problem or database
     robot = hub.robot
     return answer | {
         "version": hub.version,

@@ -161,6 +161,7 @@ class OperatorSession:
             "session": self.name,
             "version": self._hub.version,
             "gallery": self._hub.gallery.current.version,
+            "problem": self._hub.keeper.problem,
             "limits": {
                 "frame_bytes": decode.max_bytes,
                 "frame_width": decode.max_width,
@@ -375,6 +376,7 @@ class OperatorSession:
             case "keep_control":
                 self._hub.people.keep(self)
             case "arm":
+                self._hub.check_gestures()
                 await self._leases.arm(armed=True)
             case "disarm":
                 await self._leases.arm(armed=False)

@@ -9,6 +9,7 @@ passwords, which people choose.) The file is replaced as a whole and read again 
 
 import contextlib
 import datetime
+import errno
 import fcntl
 import hashlib
 import hmac
@@ -22,7 +23,7 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError
 
 from app.config import Settings
-from app.errors import CannotStart, NotFound
+from app.errors import CannotStart, NotFound, StorageFull
 from app.gateway.roles import Role
 
 log = logging.getLogger(__name__)
@@ -283,11 +284,14 @@ class TokenStore:
                 after = before.model_copy(update={"tokens": change(before.tokens)})
                 new = self._path.with_suffix(f".{secrets.token_hex(4)}")
                 handle = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-                with os.fdopen(handle, "w") as file:
-                    file.write(after.model_dump_json(indent=1) + "\n")
-                    file.flush()
-                    os.fsync(file.fileno())
-                new.replace(self._path)
+                try:
+                    with os.fdopen(handle, "w") as file:
+                        file.write(after.model_dump_json(indent=1) + "\n")
+                        file.flush()
+                        os.fsync(file.fileno())
+                    new.replace(self._path)
+                finally:
+                    new.unlink(missing_ok=True)
             finally:
                 os.close(lock)
 
@@ -296,6 +300,11 @@ class TokenStore:
         try:
             yield
         except (OSError, ValidationError) as error:
+            if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+                raise StorageFull(
+                    f"the disk that holds the tokens in {self._path} is full; nothing was changed: "
+                    "free some space and try again"
+                ) from error
             what = "is damaged" if isinstance(error, ValidationError) else f"({error})"
             raise CannotStart(
                 f"the tokens in {self._path} cannot be used: the file {what}; "

@@ -3,6 +3,7 @@
 import errno
 import importlib.resources
 import os
+import re
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,11 +23,17 @@ from sqlalchemy.exc import (
     OperationalError,
 )
 
-from app.errors import CannotStart, DatabaseBroken, StorageFull, WorldError
+from app.errors import CannotStart, DatabaseBroken, ForeignDatabase, StorageFull, WorldError
+from app.gestures.tables import Base
 
 BUSY_S = 10.0
 """How long one writer waits for another before it gives up."""
-GO_ON = "put a backup in its place, or move it away to start again from the starter set"
+NO_ROOM_BYTES = 64 * 1024
+"""A log's index grows by 32 KiB at a time."""
+GO_ON = (
+    "bring a backup back with `farhand gestures restore`, or move it away to start again from the "
+    "starter set"
+)
 
 
 def open_engine(url: str | URL) -> Engine:
@@ -126,7 +133,8 @@ def migrate(connection: Connection, name: str) -> bool:
         Whether the database was new: empty until now.
 
     Raises:
-        DatabaseBroken: it belongs to a newer version, or to something else.
+        ForeignDatabase: it belongs to a newer version, or to something else.
+        DatabaseBroken: it is damaged.
     """
     config = alembic.config.Config()
     folder = importlib.resources.files("app.gestures") / "migrations"
@@ -136,13 +144,17 @@ def migrate(connection: Connection, name: str) -> bool:
     tables = set(inspect(connection).get_table_names())
     current = MigrationContext.configure(connection).get_current_revision()
     known = {script.revision for script in scripts.walk_revisions()}
+    if current is None and len(tables & set(Base.metadata.tables)) > 1:
+        raise DatabaseBroken(f"{name} is damaged (it does not say its version); {GO_ON}")
     if current is None and tables - {"alembic_version"}:
-        raise DatabaseBroken(
+        raise ForeignDatabase(
             f"{name} holds other tables ({', '.join(sorted(tables)[:3])}), not gestures; "
             "name another file"
         )
     if current is not None and current not in known:
-        raise DatabaseBroken(
+        if re.fullmatch(r"\d{4}", current) is None:
+            raise DatabaseBroken(f"{name} is damaged (its version reads {current[:8]!r}); {GO_ON}")
+        raise ForeignDatabase(
             f"{name} was written by a newer Farhand (its version {current}, this one knows "
             f"{scripts.get_current_head()}); install the newer Farhand, or {GO_ON}",
             found=current,
@@ -167,12 +179,15 @@ def plain_errors(engine: Engine) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        if is_full(error):
             raise _full(name) from error
         raise
+    except UnicodeDecodeError as error:
+        # The driver passes on what SQLite says, in which a damaged name may stand.
+        raise DatabaseBroken(f"{name} is damaged (text that is not UTF-8); {GO_ON}") from error
     except DBAPIError as error:
         text = _one_line(error.orig)
-        if "is full" in text or "No space left" in text:
+        if "is full" in text or "No space left" in text or no_room(error.orig, _folder(engine)):
             raise _full(name) from error
         if "readonly" in text or "unable to open" in text:
             raise _not_writable(name) from error
@@ -187,6 +202,33 @@ def plain_errors(engine: Engine) -> Iterator[None]:
         if isinstance(error, DatabaseError) and engine.dialect.name == "sqlite":
             raise DatabaseBroken(f"{name} is damaged ({text}); {GO_ON}") from error
         raise
+
+
+def is_full(error: OSError) -> bool:
+    """Whether it says that no space is left, or no more is allowed."""
+    return error.errno in (errno.ENOSPC, errno.EDQUOT)
+
+
+def no_room(error: object, folder: Path) -> bool:
+    """Whether an error of SQLite comes from a full disk.
+
+    SQLite says "full" of its files, but "disk I/O error" where the log's index cannot grow, and
+    "unable to open" where a file cannot be made.
+    """
+    name = str(getattr(error, "sqlite_errorname", ""))
+    if name.startswith("SQLITE_FULL"):
+        return True
+    if not name.startswith(("SQLITE_IOERR", "SQLITE_CANTOPEN")):
+        return False
+    try:
+        room = os.statvfs(folder)
+    except OSError:
+        return False
+    return room.f_bavail * room.f_frsize < NO_ROOM_BYTES
+
+
+def _folder(engine: Engine) -> Path:
+    return Path(engine.url.database or ".").parent
 
 
 def _full(name: str) -> StorageFull:

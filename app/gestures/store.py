@@ -17,7 +17,14 @@ from sqlalchemy import URL, func, select, update
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session, selectinload
 
-from app.errors import CannotStart, DatabaseBroken, Duplicate, Invalid, NotFound
+from app.errors import (
+    CannotStart,
+    DatabaseBroken,
+    Duplicate,
+    FarhandError,
+    Invalid,
+    NotFound,
+)
 from app.gestures import database
 from app.gestures.records import (
     MAX_GESTURES,
@@ -68,9 +75,15 @@ class GestureStore:
         self._writing = threading.Lock()
         try:
             self._open(starter, actions or {})
-        except BaseException:
+        except BaseException as error:
             self._engine.dispose()
-            raise
+            if isinstance(error, FarhandError) or not isinstance(error, Exception):
+                raise
+            # Damage shows in many ways: text that is not UTF-8, a number that is none.
+            name = database.describe(self._engine)
+            raise DatabaseBroken(
+                f"{name} is damaged ({type(error).__name__}); {database.GO_ON}"
+            ) from error
 
     def _open(self, starter: Path | None, actions: Mapping[str, Action]) -> None:
         name = database.describe(self._engine)
@@ -344,15 +357,16 @@ class GestureStore:
         )
 
     def _record(self, row: GestureRow) -> Gesture:
-        sound = row.checksum == _gesture_checksum(row) and all(
-            sample.checksum == _sample_checksum(sample) and len(sample.template) == TEMPLATE_BYTES
-            for sample in row.samples
-        )
         try:
+            sound = row.checksum == _gesture_checksum(row) and all(
+                sample.checksum == _sample_checksum(sample)
+                and len(sample.template) == TEMPLATE_BYTES
+                for sample in row.samples
+            )
             if not sound:
                 raise ValueError("wrong checksum")
             action = ACTION.validate_json(row.action)
-        except (ValidationError, ValueError) as error:
+        except (ValidationError, ValueError, TypeError, AttributeError) as error:
             raise self._damaged(row) from error
         samples = tuple(
             Sample(sample.id, bytes(sample.template), _time(sample.created_ms))

@@ -155,7 +155,10 @@ link.addEventListener("message", ({ detail: message }) => {
         }
         describeRobot();
     } else if (message.type === "frame") sender.answered(message.seq);
-    else if (message.type === "gallery") loadGestures();
+    else if (message.type === "gallery") {
+        tellProblem(message.problem);
+        loadGestures();
+    }
     else if (message.type === "error") refused(message);
 });
 
@@ -167,6 +170,7 @@ function greeted() {
     hadSession = true;
     describedAt = -Infinity;
     describeRobot();
+    tellProblem(store.state.hello.problem);
     loadGestures();
     // Somebody pressed STOP and nobody heard: say it again, first of all.
     if (stopper.state === "failed") stopper.stop();
@@ -181,6 +185,12 @@ function refused(message) {
         return; // a single frame; the next one comes at once
     }
     if (message.message) notices.show(message.message, { kind: "bad", name: message.code });
+}
+
+/** What is wrong with the gestures stays on the page for as long as it keeps the robot disarmed. */
+function tellProblem(problem) {
+    if (problem) notices.show(problem, { kind: "bad", name: "gestures", stay: true });
+    else notices.clear("gestures");
 }
 
 const DESCRIBE_EVERY_MS = 3000;

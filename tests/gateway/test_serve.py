@@ -1,12 +1,14 @@
 """Running the server as a program does."""
 
 import asyncio
+import contextlib
 import io
 import os
 import re
 import shutil
 import signal
 import socket
+import sqlite3
 import ssl
 import subprocess
 import sys
@@ -146,8 +148,9 @@ def test_a_busy_port_is_one_clear_line(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_broken_database_is_one_clear_line(tmp_path: Path) -> None:
-    (tmp_path / "gestures.db").write_bytes(b"not a database at all" * 500)
+def test_a_database_of_something_else_is_one_clear_line(tmp_path: Path) -> None:
+    with contextlib.closing(sqlite3.connect(tmp_path / "gestures.db")) as other:
+        other.execute("CREATE TABLE customers (id INTEGER)")
     with program(tmp_path, "unixsock-stream//nonexistent/link") as process:
         out, err = process.communicate(timeout=60)
     assert process.returncode == 1

@@ -1,3 +1,4 @@
+import contextlib
 import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
@@ -6,6 +7,8 @@ import numpy as np
 import pytest
 
 from app.gestures import GestureStore
+from app.gestures.backup import Place
+from app.link.actions import Home
 
 STARTER = Path(__file__).parents[2] / "gesture_db"
 
@@ -38,3 +41,16 @@ def store(tmp_path: Path) -> Iterator[GestureStore]:
     store = GestureStore(url(tmp_path / "farhand.db"), None)
     yield store
     store.close()
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Place:
+    """A folder for a database and its backups."""
+    return Place(tmp_path / "gestures.db", tmp_path / "backups")
+
+
+def enrol(place: Place, *names: str) -> None:
+    """Enrol gestures, and close the database again."""
+    with contextlib.closing(GestureStore(url(place.database), None)) as store:
+        for number, name in enumerate(names):
+            store.create(name, Home(), [template(number)])
