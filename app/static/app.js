@@ -142,13 +142,17 @@ link.addEventListener("state", async ({ detail }) => {
 
 link.addEventListener("message", ({ detail: message }) => {
     if (message.type in counts) counts[message.type] += 1;
-    const drove = isDriving(store.state);
     const changes = changesFor(message, store.state, performance.now());
     if (changes) store.set(changes);
     if (message.type === "hello") greeted();
     else if (message.type === "robot") {
         stopper.saw(message);
-        if (drove && !isDriving(store.state) && !releasing) notices.show(texts.notices.lostControl);
+        // A robot that is silent for a moment names no driver: nothing is lost by that.
+        if (message.online) {
+            const drives = isDriving(store.state);
+            if (drove && !drives && !releasing) notices.show(texts.notices.lostControl);
+            drove = drives;
+        }
         if (asked && isDriving(store.state)) {
             asked = false;
             notices.show(texts.people.yours, { kind: "good", name: "control" });
@@ -166,6 +170,7 @@ function greeted() {
     store.set({ connection: { state: "open" } });
     sendSpeed();
     reported = {};
+    drove = false;
     if (hadSession) notices.show(texts.notices.reconnected, { name: "reconnected" });
     hadSession = true;
     describedAt = -Infinity;
@@ -293,6 +298,7 @@ setInterval(captionClip, 150);
 
 // What the person wants
 
+let drove = false; // as the robot said when it last spoke
 let releasing = false; // control was given back, so that losing it is no news
 let asked = false; // for control, of whoever drives
 
