@@ -459,7 +459,8 @@ class GatewaySettings(_Section):
         default=(),
         description="more host names that requests may be addressed to, and that the certificate "
         "made here holds. On loopback and with that certificate the machine's own names are always "
-        "allowed; with a certificate of yours or behind a proxy none given means any",
+        "allowed, and no others; elsewhere (a certificate of yours, a proxy on another machine) "
+        "none given means any",
     )
     max_message_bytes: int = Field(
         default=1 << 20,
