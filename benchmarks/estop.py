@@ -113,6 +113,7 @@ async def one_stop(rig: Rig, way: str) -> Outcome:
     observer = rig.observer
     await wait_async(lambda: observer.state.controller is None, "nobody drives")
     observer.forget()
+    pictures = clip(rig.next_gesture())
     async with (
         Operator(rig.url, TOKEN) as driver,
         Operator(rig.url, TOKEN) as watcher,
@@ -120,7 +121,6 @@ async def one_stop(rig: Rig, way: str) -> Outcome:
     ):
         await driver.take_and_arm()
         give_up = time.monotonic() + 60
-        pictures = clip(rig.next_gesture())
         while not observer.at_full_speed():
             if time.monotonic() > give_up:
                 raise RuntimeError(f"not at full speed: {observer.state}")
