@@ -31,7 +31,7 @@ def test_driving_over_a_slow_link_and_back_by_itself_after_a_cut(
     page = open_page(url, webcam=showing_up, allow_errors=True)
     start_driving(page)
     low = height(page)
-    wait_for(page, f"window.farhand.robot.tool.position[2] > {low + 0.05}")
+    wait_for(page, f"window.farhand.robot.tool.position[2] > {low + 0.02}")
     wait_for(page, "window.farhand.pictures.wrist > 5 && window.farhand.pictures.scene > 5")
     # The age counts from when the robot stood so, not from when the picture came.
     wait_for(page, "Object.values(window.farhand.shown).every((p) => p.shownAt - p.takenAt > 75)")

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -46,10 +47,12 @@ class Checked:
         wait_for(lambda: self.ask(Pose(name="home")) is not None, "the first answer", 60)
 
     def ask(self, action: Action, start: str = "current") -> DryRunReport | None:
-        """Once nothing else is being checked. None: there is nobody to answer."""
+        """Once nothing else is being checked, and a child that was just started knows where the arm
+        is. None: there is nobody to answer."""
         while (report := ask(self.remote.end, action, start)) is not None:
-            if report.code != "busy":
+            if report.code not in ("busy", "robot_unavailable"):
                 break
+            time.sleep(0.05)
         return report
 
     def child(self) -> psutil.Process:
