@@ -102,6 +102,7 @@ class Outcome(NamedTuple):
 
     took_ms: float
     latched: bool
+    why_not: str = ""
 
 
 async def one_stop(rig: Rig, way: str) -> Outcome:
@@ -140,10 +141,7 @@ async def one_stop(rig: Rig, way: str) -> Outcome:
                 (await api.post("/api/robots/puma/stop")).raise_for_status()
         await asyncio.sleep(1.0)
         stood = observer.standstill(stopped, tick_now())
-        await driver.say("arm")
-        with contextlib.suppress(TimeoutError):
-            await driver.wait_for(lambda: any(e["code"] == "latched" for e in driver.errors), 5)
-        refused = any(error["code"] == "latched" for error in driver.errors)
+        refused = await _is_refused(driver)
         showing.cancel()
         with contextlib.suppress(asyncio.CancelledError, ConnectionClosed):
             await showing
@@ -153,7 +151,23 @@ async def one_stop(rig: Rig, way: str) -> Outcome:
             if state.tick >= stood.at
         )
         moved = observer.moved_between(stood.at, tick_now())
-        return Outcome(stood.since_fault_ms, refused and latched and not moved)
+        wrong = {"arming was not refused": not refused, "not latched": not latched, "moved": moved}
+        why_not = ", ".join(what for what, so in wrong.items() if so)
+        return Outcome(stood.since_fault_ms, not why_not, why_not)
+
+
+async def _is_refused(driver: Operator) -> bool:
+    """Whether arming is refused because the stop is latched."""
+    for _ in range(3):
+        # On a busy machine control may have run out meanwhile, and is then what is missing first.
+        if not driver.robot["controller"]:
+            await driver.say("take_control")
+        await driver.say("arm")
+        with contextlib.suppress(TimeoutError):
+            await driver.wait_for(lambda: any(e["code"] == "latched" for e in driver.errors), 5)
+            return True
+        print([error["code"] for error in driver.errors], flush=True)
+    return False
 
 
 async def is_latched(rig: Rig) -> bool:
