@@ -44,6 +44,7 @@ from app.gestures import GestureStore, backup
 from app.gestures.backup import Place
 from app.gestures.hand import POSES, HandView, render_hand
 from benchmarks.report import arguments, promise, report
+from tests.conftest import fill
 from tests.e2e.running import TOKEN, Server, start_server
 
 SAMPLES = 2
@@ -201,7 +202,7 @@ def full(times: int, rng: random.Random) -> dict[str, Any]:
     with small_disk() as folder, served(folder) as (server, seconds), server.api() as api:
         there = {gesture["name"] for gesture in api.get("/api/gestures").json()}
         for number in range(times):
-            filler = _fill(folder, leave=rng.choice((0, 0, 4096, 16384, 65536)))
+            filler = fill(folder, leave=rng.choice((0, 0, 4096, 16384, 65536)))
             status = 201
             for again in range(40):
                 name = f"{number} {again}"
@@ -234,17 +235,6 @@ def full(times: int, rng: random.Random) -> dict[str, Any]:
         "worst": seconds,
         **promise("507, nothing changed", kept=not wrong),
     }
-
-
-def _fill(folder: Path, leave: int) -> Path:
-    path = folder / "filler"
-    with path.open("wb", buffering=0) as file:
-        try:
-            while True:
-                file.write(bytes(4096))
-        except OSError:
-            file.truncate(max(0, path.stat().st_size - leave))
-    return path
 
 
 def damaged(folder: Path, times: int, rng: random.Random) -> dict[str, Any]:
