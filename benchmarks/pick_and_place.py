@@ -41,6 +41,8 @@ from tests.e2e.running import start_server, stop_server
 
 F64 = NDArray[np.float64]
 CUBE = "red_cube"
+SIDE = 0.045
+"""m; of the cube."""
 GESTURES = ("forward", "back", "left", "right", "up", "down", "open", "close")
 MISJUDGED_M = 0.003
 """Standard deviation, per axis, of where the operator thinks that the cube is: about a pixel of the
@@ -152,7 +154,8 @@ def pick_and_place(
         driver.to(Z, place[Z] + 0.07, 0.03)
         driver.to(Z, place[Z] + GRASP, 0.012)
     with phase("close"):
-        driver.grip("close", lambda state: state.gripper < 0.048)
+        # Fingers that were broken off on their way hold nothing: they must be at the cube's sides.
+        driver.grip("close", lambda state: state.gripper < SIDE + 0.001)
     grasped = eyes.now().tool_position[Z]
     with phase("up"):
         driver.to(Z, grasped + CARRY, 0.03)
