@@ -2,6 +2,7 @@
 
 import random
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -185,13 +186,13 @@ def test_what_is_held_is_part_of_the_arm(proximity: SimulatedProximity) -> None:
 
 
 def test_what_settles_in_the_hand_is_noticed(proximity: SimulatedProximity) -> None:
-    arm = FakeArm(LOW)
-    x, y, z = arm.read().tool.position
+    reading = FakeArm(LOW).read()
+    x, y, z = reading.tool.position
 
     def hold(height: float) -> bool:
         cube = ObjectState(name="red_cube", position=(x, y, height), orientation=(1, 0, 0, 0))
-        arm.objects, arm.held, arm.width = (cube,), "red_cube", 0.045
-        return proximity.follow(arm.read(), standing=True)
+        held = replace(reading, objects=(cube,), held="red_cube", gripper=0.045)
+        return proximity.follow(held, standing=True)
 
     assert hold(z)
     assert not hold(z)
