@@ -2,7 +2,6 @@
 
 import random
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -191,7 +190,7 @@ def test_what_settles_in_the_hand_is_noticed(proximity: SimulatedProximity) -> N
 
     def hold(height: float) -> bool:
         cube = ObjectState(name="red_cube", position=(x, y, height), orientation=(1, 0, 0, 0))
-        held = replace(reading, objects=(cube,), held="red_cube", gripper=0.045)
+        held = reading._replace(objects=(cube,), held="red_cube", gripper=0.045)
         return proximity.follow(held, standing=True)
 
     assert hold(z)
