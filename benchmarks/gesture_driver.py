@@ -31,6 +31,9 @@ MOVES = {
 """Gestures of the starter set by axis of the base: towards more, towards less."""
 STARTS_S = 1.5
 """When a hand at rest has moved nothing for so long, it is lowered and shown again."""
+ASTRAY_M = 0.012
+"""When the tool has gone so far another way than wanted, the sign was taken for another: the hand
+is lowered and shown a little differently."""
 STILL_M = 0.001
 """The tool has not come farther than this: it stood."""
 
@@ -188,8 +191,9 @@ class GestureDriver:
         self._since = None
         began, start = self.clock.now(), _tool(self.eyes.now())
         rested = self.webcam.raise_hand(gesture)
-        while not self._lets_go(rested, enough, longest):
+        while not self._lets_go(rested, enough, longest) and not self._astray(axis, gesture, start):
             self.clock.sleep(0.01)
+        astray = self._astray(axis, gesture, start)
         speed, driving = self._speed(), self.eyes.now().mode == "moving"
         seen = _tool(self.eyes.see())
         self.webcam.lower_hand(wait=False)
@@ -205,9 +209,17 @@ class GestureDriver:
             self.runs_on[speed] += LEARNS * (runs_on - self.runs_on[speed])
         self.showings.append(Showing(gesture, began, rested, self._since, let_go, stood, way))
         broken_off = axis is not None and not driving and self.eyes.see().mode == "armed"
-        if self._since is None or broken_off:
+        if self._since is None or broken_off or astray:
             # The sign was not understood, or not all the time: show it a little differently.
             self.webcam.person = replace(self.webcam.person, seed=self.webcam.person.seed + 1)
+
+    def _astray(self, axis: int | None, gesture: str, start: F64) -> bool:
+        """The robot is seen to do something else than what was shown."""
+        moved = _tool(self.eyes.see()) - start
+        if axis is not None:
+            towards = 1.0 if gesture == MOVES[axis][0] else -1.0
+            moved[axis] = min(0.0, towards * moved[axis])
+        return bool(np.abs(moved).max() > ASTRAY_M)
 
     def _lets_go(self, rested: float, enough: Callable[[], bool], longest: float) -> bool:
         """Whether to lower the hand now, which has been held still since ``rested``."""

@@ -148,27 +148,57 @@ def pick_and_place(
         at_phase(name)
 
     with phase("above the cube"):
-        driver.to(Y, place[Y], 0.009)
-        driver.to(X, place[X], 0.011)
-    with phase("down to it"):
-        driver.to(Z, place[Z] + 0.07, 0.03)
-        driver.to(Z, place[Z] + GRASP, 0.012)
-    with phase("close"):
-        # Fingers that were broken off on their way hold nothing: they must be at the cube's sides.
-        driver.grip("close", lambda state: state.gripper < SIDE + 0.001)
-    grasped = eyes.now().tool_position[Z]
+        above(driver, place, 0.009, 0.011)
+    with phase("grasp"):
+        grasped = grasp(driver, place)
     with phase("up"):
         driver.to(Z, grasped + CARRY, 0.03)
         if cube(eyes.now())[Z] < place[Z] + CARRY / 2:
             raise CannotDrive("the cube did not come along")
     with phase("over the tray"):
-        driver.to(Y, tray.middle[Y], 0.04)
-        driver.to(X, tray.middle[X], 0.03)
+        above(driver, np.array([*tray.middle, 0.0]), 0.04, 0.03)
     with phase("down into it"):
         driver.to(Z, grasped + DROP, 0.02)
     with phase("open"):
         driver.grip("open", lambda state: state.gripper > 0.06)
     return seconds
+
+
+def above(driver: GestureDriver, place: F64, within_y: float, within_x: float) -> None:
+    """Bring the tool above a place; again, if a sign that was mistaken took it away meanwhile.
+
+    Raises:
+        CannotDrive: patience is at its end, or the robot is stopped.
+    """
+    while True:
+        driver.to(Y, place[Y], within_y)
+        driver.to(X, place[X], within_x)
+        if abs(driver.eyes.now().tool_position[Y] - place[Y]) <= within_y:
+            return
+
+
+def grasp(driver: GestureDriver, place: F64) -> float:
+    """Go down to the cube and close the gripper on it; again, as long as it holds nothing.
+
+    Returns:
+        The tool's height then, m.
+
+    Raises:
+        CannotDrive: patience is at its end, or the robot is stopped.
+    """
+    eyes = driver.eyes
+    while True:
+        driver.to(Z, place[Z] + 0.07, 0.03)
+        above(driver, place, 0.009, 0.011)
+        driver.to(Z, place[Z] + GRASP, 0.012)
+        tool = np.asarray(eyes.now().tool_position)
+        if np.abs(tool - place).max() > 0.02:
+            continue
+        # Fingers that were broken off on their way hold nothing: they must be at the cube's sides.
+        driver.grip("close", lambda state: state.gripper < SIDE + 0.001)
+        if eyes.now().gripper > SIDE - 0.003:
+            return eyes.now().tool_position[Z]
+        driver.grip("open", lambda state: state.gripper > 0.07)
 
 
 def judge(eyes: Eyes) -> str | None:

@@ -139,7 +139,7 @@ class Guard:
             changed = self._proximity.follow(reading, standing=standing)
         moved = self._here is None or np.abs(joints - self._here).max() > 1e-5
         if (changed or moved) and (not standing or moved or self._since >= _EVERY):
-            self._look_round(joints)
+            self._look_round(joints, standing=standing)
 
     def margins(self, joints: Vector) -> list[Margin]:
         """Everything within slowing distance, with the joints at ``joints`` (rad, shape (n,))."""
@@ -219,12 +219,15 @@ class Guard:
         self._accept(trajectory.position, here, clearance)
         return True
 
-    def _look_round(self, joints: Vector) -> None:
+    def _look_round(self, joints: Vector, *, standing: bool) -> None:
         margins, clearance = self._ask(joints)
+        # A thing that has settled by less than the leeway must not use it all up: the first step
+        # of the way out would then be a hair too near, and no way would be open.
+        settled = _LEEWAY / 2 if standing else _LEEWAY
         for margin in margins:
             floor = self._floors.get(margin.pair)
             # Nearer than any step of ours left it: the thing has moved, or the arm by itself.
-            if margin.distance < (margin.stop + _RESERVE if floor is None else floor - _LEEWAY):
+            if margin.distance < (margin.stop + _RESERVE if floor is None else floor - settled):
                 self._floors[margin.pair] = margin.distance
         self._since = 0
         self._accept(joints, margins, clearance)

@@ -32,6 +32,14 @@ _AROUND = 0.15
 """m; one look farther out serves for all joints from which no point travels farther than this."""
 _TURNED = 2e-3
 """The same for a quaternion's components: 0.2 mm at 50 mm."""
+_SETTLED = 1e-5
+"""m; what is held and has moved less in the hand is where it was. Finer than the guard's leeway: a
+thing that stands on another one may not seem to sink into it by the first step of the way out."""
+_TILTED = 1e-4
+"""The same for a quaternion's components: 10 um at 50 mm."""
+
+Pose = tuple[tuple[float, ...], tuple[float, ...]]
+"""m, and quaternion x, y, z, w."""
 
 
 class SimulatedProximity:
@@ -84,7 +92,7 @@ class SimulatedProximity:
         self._placed: dict[str, tuple[Vector, Vector]] = {}
         self._width = -1.0
         self._held: str | None = None
-        self._in_hand: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+        self._in_hand: Pose | None = None
         """Where the held thing is in the palm's frame: m, and a quaternion x, y, z, w."""
 
     @property
@@ -106,9 +114,11 @@ class SimulatedProximity:
                     self._body, finger, reading.gripper / 2, physicsClientId=self.client
                 )
         if reading.held != self._held or (self._held is not None and standing):
-            changed |= reading.held != self._held
             self._held = reading.held if reading.held in self._movable else None
-            self._in_hand = self._grasp(reading) if self._held is not None else None
+            in_hand = self._grasp(reading) if self._held is not None else None
+            if not _alike(in_hand, self._in_hand):
+                self._in_hand = in_hand
+                changed = True
         for thing in reading.objects:
             if thing.name != self._held and thing.name in self._movable:
                 changed |= self._put(thing)
@@ -244,7 +254,7 @@ class SimulatedProximity:
         )
         return True
 
-    def _grasp(self, reading: Reading) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
+    def _grasp(self, reading: Reading) -> Pose | None:
         """Where the held thing is in the palm's frame, both as measured."""
         for thing in reading.objects:
             if thing.name == self._held:
@@ -256,7 +266,7 @@ class SimulatedProximity:
                 return tuple(position), tuple(turn)
         return None
 
-    def _palm_pose(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    def _palm_pose(self) -> Pose:
         state = pybullet.getLinkState(
             self._body, self._palm, computeForwardKinematics=True, physicsClientId=self.client
         )
@@ -269,6 +279,16 @@ class SimulatedProximity:
             pybullet.resetBasePositionAndOrientation(
                 held, position, turn, physicsClientId=self.client
             )
+
+
+def _alike(one: Pose | None, other: Pose | None) -> bool:
+    """Whether two poses are the same, but for the trembling of a simulated grasp."""
+    if one is None or other is None:
+        return one is other
+    return bool(
+        np.abs(np.subtract(one[0], other[0])).max() < _SETTLED
+        and np.abs(np.subtract(one[1], other[1])).max() < _TILTED
+    )
 
 
 def always_near(

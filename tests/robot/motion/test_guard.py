@@ -2,6 +2,7 @@
 
 import random
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,9 +10,9 @@ import pytest
 from app.config import ClearanceSettings
 from app.link.actions import JogCartesian, JogJoint, Pose, TurnJoint
 from app.link.messages import ObjectState
-from app.robot.arm import ToolPose
+from app.robot.arm import Near, Reading, ToolPose
 from app.robot.models import model_assets
-from app.robot.motion.guard import Margin
+from app.robot.motion.guard import Guard, Margin
 from app.robot.sim.proximity import SimulatedProximity
 from tests.robot.fakes import DT, FakeArm
 from tests.robot.motion.rig import Rig
@@ -182,6 +183,55 @@ def test_what_is_held_is_part_of_the_arm(proximity: SimulatedProximity) -> None:
     down = rig.arm.read().tool.position[2]
     assert 0.402 <= down - 0.0225 < 0.404
     assert any("red cube is 2 mm from the table" in text for text in rig.limits)
+
+
+def test_what_settles_in_the_hand_is_noticed(proximity: SimulatedProximity) -> None:
+    reading = FakeArm(LOW).read()
+    x, y, z = reading.tool.position
+
+    def hold(height: float) -> bool:
+        cube = ObjectState(name="red_cube", position=(x, y, height), orientation=(1, 0, 0, 0))
+        held = replace(reading, objects=(cube,), held="red_cube", gripper=0.045)
+        return proximity.follow(held, standing=True)
+
+    assert hold(z)
+    assert not hold(z)
+    assert hold(z - 5e-5)
+
+
+class OneThing:
+    """Something held, at a distance that the test sets."""
+
+    distance = -1e-5
+
+    def follow(self, reading: Reading, *, standing: bool) -> bool:
+        return True
+
+    def near(self, joints: np.ndarray, within: float) -> list[Near]:
+        here = (0.0, 0.0, 0.0)
+        return [Near("held", "cube", "table", self.distance, (here, here), (0, 6))]
+
+    def plain(self, name: str) -> str:
+        return name
+
+
+def test_a_thing_that_settles_in_the_hand_leaves_the_way_out_open() -> None:
+    """On the table, it sinks by less than the leeway; the rounding of the first step follows."""
+    arm, thing = FakeArm(), OneThing()
+    guard = Guard(thing, arm.kinematics, None, SETTINGS, 6)
+    joints = arm.joints
+
+    def room() -> float:
+        return guard.room(guard.margins(joints))
+
+    guard.watch(arm.read(), joints, standing=True)
+    thing.distance = -1.08e-4
+    for _ in range(8):
+        guard.watch(arm.read(), joints, standing=True)
+    thing.distance = -1.12e-4
+    assert room() > 0
+    thing.distance = -2.5e-4  # that is no rounding
+    assert room() < 0
 
 
 def test_the_state_tells_what_is_nearest(proximity: SimulatedProximity) -> None:
