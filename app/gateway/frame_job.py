@@ -55,12 +55,13 @@ class FrameWorker:
         enrolled: Enrolled,
         robot: RobotPort,
         holds: Counter,
+        sequence: Counter,
     ) -> None:
         self._settings = settings
         self._robot = robot
         self._pipeline = Pipeline(settings.pipeline, enrolled.matcher)
         self._version = enrolled.version
-        self._driver = Driver(session, holds)
+        self._driver = Driver(session, holds, sequence)
         self._frozen = FrozenCamera(settings.gateway.frozen_ms)
 
     def run(self, job: FrameJob) -> FrameDone:

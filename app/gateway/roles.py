@@ -80,6 +80,7 @@ MESSAGES: dict[str, Access] = {
     "ask_control": "operator",
     "keep_control": "operator",
     "hand_over": "operator",
+    "jog": "operator",
     "arm": "operator",
     "disarm": "operator",
     "reset": "operator",

@@ -14,10 +14,13 @@ from app.gateway.errors import INTERNAL_MESSAGE
 from app.gateway.eyes import PictureAge
 from app.gateway.frame_age import FrameAge
 from app.gateway.frame_job import FrameDone, FrameJob, FrameWorker
+from app.gateway.gallery import Enrolled
+from app.gateway.held_keys import HeldKeys
 from app.gateway.lease_keeper import LeaseKeeper
 from app.gateway.messages import (
     ClientMessage,
     HandOver,
+    Jog,
     Picture,
     Ping,
     Speed,
@@ -26,7 +29,7 @@ from app.gateway.messages import (
     error_message,
     parse_client_message,
 )
-from app.gateway.numbers import newer, tick_ms
+from app.gateway.numbers import Counter, newer, tick_ms
 from app.gateway.outbox import Outbox
 from app.gateway.pace import Pace
 from app.gateway.roles import FRAME, OPERATORS_ONLY, Role, may_send
@@ -47,6 +50,9 @@ MAX_MESSAGES_HZ = 200.0
 take the time of all; a page sends less than half of it."""
 MESSAGE_BURST = 100
 IDLE_CHECK_S = 0.05
+KEYS_S = 0.5
+"""So long after its last ``jog`` message a session counts as driving by keys, and its frames move
+nothing: twice the life of a command."""
 CLOSE_BAD = 1007
 CLOSE_TOO_BIG = 1009
 CLOSE_TOO_SLOW = 1013
@@ -84,9 +90,14 @@ class OperatorSession:
         self._hub = hub
         self._socket = socket
         self._settings = hub.settings
+        sequence = Counter()
         self._worker = FrameWorker(
-            self.name, hub.settings, hub.gallery.current, hub.robot, hub.holds
+            self.name, hub.settings, hub.gallery.current, hub.robot, hub.holds, sequence
         )
+        self._keys = HeldKeys(hub.holds, sequence)
+        self._keys_at = float("-inf")
+        self._keys_age = FrameAge(hub.settings.gateway.max_frame_age_ms, "key press")
+        self._keys_told: tuple[int, str | None] | None = None
         self._heard_at = time.monotonic()
         self._leases = LeaseKeeper(self.name, hub.robot, hub.ask, self._silent_s, self.tell)
         self._requests: asyncio.Queue[ClientMessage] = asyncio.Queue(MAX_REQUESTS)
@@ -229,25 +240,47 @@ class OperatorSession:
         if detail:
             self._next_detail = now + 1 / self._settings.gateway.detail_rate_hz
         enrolled = self._hub.gallery.current
-        state = self._hub.robot.live_state
+        stale = self._age(header.tick, header.captured_ms, tick_ms())
+        by_keys = now - self._keys_at < KEYS_S
         self._slot = FrameJob(
             seq=seq,
             jpeg=jpeg,
             arrived=now,
             arrival=self._arrivals,
-            situation=Situation(
-                actions=enrolled.actions,
-                lease=self._leases.lease,
-                state=state,
-                stale=self._age(header.tick, header.captured_ms, tick_ms()),
-                unseen=None if state is None else self._pictures(state.tick),
-                scale=self._scale,
-                at=now,
-            ),
+            situation=self._situation(enrolled, now, stale, by_keys=by_keys),
             enrolled=enrolled,
             detail=detail,
         )
         self._slot_filled.set()
+
+    def _situation(
+        self, enrolled: Enrolled, now: float, stale: str | None, *, by_keys: bool
+    ) -> Situation:
+        state = self._hub.robot.live_state
+        return Situation(
+            actions=enrolled.actions,
+            lease=self._leases.lease,
+            state=state,
+            stale=stale,
+            unseen=None if state is None else self._pictures(state.tick),
+            scale=self._scale,
+            at=now,
+            by_keys=by_keys,
+        )
+
+    def _take_jog(self, jog: Jog) -> None:
+        """Command what a held key asks for, and say when nothing comes of it, and why."""
+        now = self._keys_at = time.monotonic()
+        stale = self._keys_age(jog.tick, 0.0, tick_ms())
+        situation = self._situation(self._hub.gallery.current, now, stale, by_keys=False)
+        decision = self._keys.decide(jog, situation)
+        if decision.command is not None:
+            self._hub.robot.send(decision.command)
+            self._hub.metrics.commands.inc()
+        told = (jog.hold, decision.reason)
+        if told != self._keys_told:
+            self._keys_told = told
+            self.outbox.put({"type": "jog", "hold": jog.hold, "reason": decision.reason})
 
     def _check_frame(self, jpeg: bytes) -> None:
         limits = self._settings.pipeline.decode
@@ -280,6 +313,8 @@ class OperatorSession:
                 self._detail = message.detail
             case Speed():
                 self._scale = message.scale
+            case Jog():
+                self._take_jog(message)
             case Picture():
                 self._pictures.saw(message.camera, message.tick)
             case TakeControl() | HandOver():

@@ -3,6 +3,8 @@
 import { api } from "./core/api.js";
 import { CameraFeed } from "./core/camera-feed.js";
 import { FrameSender } from "./core/frame-sender.js";
+import { GamepadReader } from "./core/gamepad.js";
+import { Held } from "./core/held.js";
 import { grabStill } from "./core/jpeg.js";
 import { changesFor, INITIAL_STATE } from "./core/messages.js";
 import { OperatorLink } from "./core/operator-link.js";
@@ -59,6 +61,8 @@ const stopper = new Stopper(link, api, robotId);
 const clock = new ServerClock(link);
 const when = (tick) => clock.when(tick);
 const feeds = { wrist: new CameraFeed("wrist", when), scene: new CameraFeed("scene", when) };
+const held = new Held(link);
+let jog = { down: () => false, up: () => {}, pad: () => {} }; // until somebody drives by keys
 const counts = { hello: 0, frame: 0, gesture: 0, robot: 0, gallery: 0, pong: 0, error: 0 };
 let lastError = null;
 
@@ -85,11 +89,38 @@ readout(byId("readout"), store);
 const pressed = keys(root, {
     closeSheet: () => sheets.close(),
     canMove: () => Boolean(store.state.robot && store.state.robot.armed),
+    jog: { down: (event) => jog.down(event), up: (event) => jog.up(event) },
 });
 const views = stage(byId("stage"), store, { feeds, onFrame: pressed.listen, memory });
 
 const sender = new FrameSender(link, video);
 const source = new SourceKeeper(video, store, sender);
+
+// Who drives by keys
+
+let jogAsked = false;
+const byKeys = () => store.state.source.kind === "keys";
+
+async function loadJog() {
+    jogAsked = true;
+    const { jogPad } = await import("./ui/jog.js");
+    jog = jogPad(byId("jog"), store, {
+        held,
+        mayPress: () => !sheets.name,
+        stop: () => wishes.stop(),
+    });
+    new GamepadReader(byKeys, (wanted) => jog.pad(wanted));
+}
+
+store.watch(["connection", "hello", "robot", "source"], (state) => {
+    byId("jog").hidden = !byKeys();
+    if (byKeys() && !jogAsked) loadJog();
+    if (byKeys() && isDriving(state)) held.start();
+    else held.stop();
+});
+// A key that goes up while another window has the focus is never heard of.
+window.addEventListener("blur", () => held.release());
+document.addEventListener("visibilitychange", () => held.release());
 
 // Sheets and notices end where the dock begins, however tall its words make it.
 new ResizeObserver(([entry]) => {

@@ -634,6 +634,31 @@ def test_who_sees_an_old_picture_of_the_robot_moves_nothing(
         show_until(operator, hand("forward"), lambda frame: frame["doubt"] is None)
 
 
+def test_held_keys_command_the_robot_and_frames_do_not_meanwhile(
+    server: Running, node: StandIn, hand: Hand
+) -> None:
+    up = {"type": "jog_cartesian", "frame": "base", "linear": [0.0, 0.0, 0.1]}
+    with server.operator() as operator:
+        operator.send("jog", hold=1, action=up, tick=operator.tick)
+        refused = operator.next("jog", hold=1)
+        assert refused["reason"] == "nobody has control: take control first"
+        take_and_arm(operator)
+        operator.send("jog", hold=2, action=up, scale=0.5, tick=operator.tick)
+        command = wait_for(
+            lambda: next((c for c in node.commands if c.action is not None), None), "no command"
+        )
+        assert command.action.model_dump(exclude={"duration"})["linear"] == (0.0, 0.0, 0.1)
+        assert (command.scale, command.frame) == (0.5, None)
+        before = len(node.commands)
+        answer = operator.show(hand("open"))
+        assert answer["reason"] in (None, answer["reason"])
+        operator.send("jog", hold=2, action=None, tick=operator.tick)
+        wait_for(lambda: len(node.commands) > before, "nothing held is no command")
+        assert all(c.frame is None for c in node.commands[before:])
+        operator.send("jog", hold=3, action=up, tick=max(1, operator.tick - 5000))
+        assert "too old to move the robot" in operator.next("jog", hold=3)["reason"]
+
+
 def test_the_speed_that_is_asked_for_goes_to_the_robot(
     server: Running, node: StandIn, hand: Hand
 ) -> None:

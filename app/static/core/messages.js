@@ -12,6 +12,7 @@ export const INITIAL_STATE = Object.freeze({
     detail: null, // newest masks, template and distances
     detailAt: -Infinity,
     gesture: null, // newest `gesture` message
+    jog: null, // newest `jog` message: why nothing comes of what is held
     people: null, // newest `people` message
     gestures: [],
     gesturesState: "loading",
@@ -29,7 +30,7 @@ export const INITIAL_STATE = Object.freeze({
 export function changesFor(message, state, now) {
     switch (message.type) {
         case "hello":
-            return { hello: message, robot: null, frame: null, detail: null, gesture: null };
+            return { hello: message, robot: null, frame: null, detail: null, gesture: null, jog: null };
         case "frame": {
             const changes = { frame: message, frameAt: now };
             if (message.detail) Object.assign(changes, { detail: message.detail, detailAt: now });
@@ -37,6 +38,8 @@ export function changesFor(message, state, now) {
         }
         case "gesture":
             return { gesture: message };
+        case "jog":
+            return { jog: message };
         case "people":
             return { people: message };
         case "robot": {

@@ -67,7 +67,7 @@ export const texts = Object.freeze({
         reload: "Load the page again",
     },
 
-    steps: { source: "Picture", control: "Control", armed: "Armed" },
+    steps: { source: "Input", control: "Control", armed: "Armed" },
 
     actions: {
         start: "Start driving",
@@ -130,14 +130,17 @@ export const texts = Object.freeze({
         stoppedNext: "Reset when it is safe; that moves nothing.",
         stoppedWatch: "An operator can reset it.",
         watching: "Nobody drives. You watch, and can stop the robot.",
-        noSource: "Show the robot a hand: use your camera, or try it without one.",
+        noSource: "Show the robot a hand: use your camera, try it without one, or use keys.",
         sourceStarting: "Waiting for the camera. Allow it in the browser if asked.",
         noControl: "Take control to drive.",
         otherDrives: (name) => `${name} drives. You watch; your gestures move nothing.`,
         disarmed: "Arm the robot, and gestures move it.",
+        disarmedKeys: "Arm the robot, and keys move it.",
         disarmedWhy: (why) => `Disarmed: ${why}. Arm to go on.`,
         holding: (why) => (why ? `Holding still: ${why}.` : "Holding still."),
         holdingNext: "Show no gesture for half a second, then show it again.",
+        holdingKeys: "Let go for half a second, then press again.",
+        readyKeys: "Ready. Hold a button or a key.",
         // Why it holds, when what you show or see cannot be trusted.
         doubts: {
             no_hand: "your hand is not in the picture",
@@ -178,6 +181,8 @@ export const texts = Object.freeze({
         useCameraWords: "Your picture goes to this server only, and is not kept.",
         trySynthetic: "No camera? Try it",
         trySyntheticWords: "A drawn hand shows the gestures, over and over.",
+        useKeys: "Drive by keys",
+        useKeysWords: "Keyboard, buttons or a gamepad. Gestures are not needed.",
         choose: "Camera",
         otherCamera: (number) => `Camera ${number}`,
         stop: "Turn off",
@@ -242,6 +247,44 @@ export const texts = Object.freeze({
             title: "The camera could not be opened",
             words: "Try again. If that does not help, choose another camera.",
         },
+    },
+
+    jog: {
+        title: "Keys",
+        how: "The arm moves while you hold a button or its key.",
+        gamepad:
+            "Gamepad: hold a shoulder button and push a stick. A closes the gripper, X opens it, " +
+            "Y goes home, B stops.",
+        groups: { move: "Move", joint: "Joints", tool: "Gripper", pose: "Go to", program: "Programs" },
+        moves: {
+            forward: "Forward",
+            back: "Back",
+            left: "Left",
+            right: "Right",
+            up: "Up",
+            down: "Down",
+            "turn-left": "Turn left",
+            "turn-right": "Turn right",
+            "tip-forward": "Tip forward",
+            "tip-back": "Tip back",
+            "roll-left": "Roll left",
+            "roll-right": "Roll right",
+            open: "Open",
+            close: "Close",
+            home: "Home",
+        },
+        keys: {
+            Shift: "⇧",
+            ArrowUp: "↑",
+            ArrowDown: "↓",
+            ArrowLeft: "←",
+            ArrowRight: "→",
+            PageUp: "PgUp",
+            PageDown: "PgDn",
+        },
+        joint: (name, sign) => `${name} ${sign < 0 ? "−" : "+"}`,
+        picked: (joint) => `Keys + and − turn joint ${joint}; a digit picks another.`,
+        pose: (name) => name,
     },
 
     gestures: {
@@ -451,7 +494,7 @@ export const texts = Object.freeze({
     help: {
         title: "Help",
         how: [
-            "Start driving: choose your camera, or the drawn hand if you have none.",
+            "Start driving: choose your camera, the drawn hand if you have none, or keys.",
             "Take control: only one person drives at a time.",
             "Arm: from now on your gestures move the robot.",
             "Show a gesture and keep still. The robot moves while you hold it, and stops when you lower your hand.",
@@ -464,6 +507,9 @@ export const texts = Object.freeze({
             ["C", "Take or release control"],
             ["F", "Fine: a fifth of the speed"],
             ["W", "Swap wrist and scene"],
+            ["Arrows, Page Up, Page Down", "With “Drive by keys”: move; with Shift: turn"],
+            ["1 to 9, + and −", "With “Drive by keys”: pick a joint, turn it"],
+            ["O, G, H", "With “Drive by keys”: open, close the gripper, go home"],
             ["?", "This help"],
         ],
         keysNote: "Space always stops; press buttons with Enter. Keys do nothing while you type in a field.",

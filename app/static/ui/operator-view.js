@@ -77,7 +77,7 @@ function choice(iconName, title, text, id, onclick) {
     );
 }
 
-/** The two ways to give the robot pictures; also used by the "start driving" sheet. */
+/** The ways to tell the robot what to do; also used by the "start driving" sheet. */
 export function sourceChoices(element, prefix) {
     return [
         choice("camera", words.useCamera, words.useCameraWords, `${prefix}-camera`, () =>
@@ -85,6 +85,9 @@ export function sourceChoices(element, prefix) {
         ),
         choice("hand", words.trySynthetic, words.trySyntheticWords, `${prefix}-synthetic`, () =>
             want(element, "source", { kind: "synthetic" }),
+        ),
+        choice("keys", words.useKeys, words.useKeysWords, `${prefix}-keys`, () =>
+            want(element, "source", { kind: "keys" }),
         ),
     ];
 }
