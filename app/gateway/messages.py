@@ -31,6 +31,7 @@ CLIENT_MESSAGES = (
     "keep_control",
     "hand_over",
     "jog",
+    "use_gallery",
 )
 SERVER_MESSAGES = (
     "hello",
@@ -70,6 +71,13 @@ class HandOver(_ClientMessage):
 
     type: Literal["hand_over"]
     to: str = Field(min_length=1, max_length=40, description="its name")
+
+
+class UseGallery(_ClientMessage):
+    """Recognise this session against another gallery; answered with ``gallery``."""
+
+    type: Literal["use_gallery"]
+    gallery: str = Field(min_length=1, max_length=64, description="its id")
 
 
 class View(_ClientMessage):
@@ -112,7 +120,7 @@ class Ping(_ClientMessage):
 
 
 ClientMessage = Annotated[
-    TakeControl | Plain | HandOver | View | Speed | Picture | Jog | Ping,
+    TakeControl | Plain | HandOver | UseGallery | View | Speed | Picture | Jog | Ping,
     Field(discriminator="type"),
 ]
 _CLIENT_MESSAGE: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)

@@ -15,6 +15,7 @@ from app.gateway.eyes import PictureAge
 from app.gateway.frame_age import FrameAge
 from app.gateway.frame_job import FrameDone, FrameJob, FrameWorker
 from app.gateway.gallery import Enrolled
+from app.gateway.gallery_choice import GalleryChoice
 from app.gateway.held_keys import HeldKeys
 from app.gateway.lease_keeper import LeaseKeeper
 from app.gateway.messages import (
@@ -25,6 +26,7 @@ from app.gateway.messages import (
     Ping,
     Speed,
     TakeControl,
+    UseGallery,
     View,
     error_message,
     parse_client_message,
@@ -98,6 +100,7 @@ class OperatorSession:
         self._keys_at = float("-inf")
         self._keys_age = FrameAge(hub.settings.gateway.max_frame_age_ms, "key press")
         self._keys_told: tuple[int, str | None] | None = None
+        self._gallery = GalleryChoice(hub.gallery)
         self._heard_at = time.monotonic()
         self._leases = LeaseKeeper(self.name, hub.robot, hub.ask, self._silent_s, self.tell)
         self._requests: asyncio.Queue[ClientMessage] = asyncio.Queue(MAX_REQUESTS)
@@ -136,6 +139,7 @@ class OperatorSession:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
+            self._gallery.close()
             await asyncio.shield(self._leases.close())
 
     async def _end(self, task: asyncio.Task[None]) -> None:
@@ -171,7 +175,7 @@ class OperatorSession:
             "robot": self._hub.robot.id,
             "session": self.name,
             "version": self._hub.version,
-            "gallery": self._hub.gallery.current.version,
+            "gallery": self._hub.gallery.version,
             "problem": self._hub.keeper.problem,
             "limits": {
                 "frame_bytes": decode.max_bytes,
@@ -239,7 +243,7 @@ class OperatorSession:
         detail = self._detail and now >= self._next_detail
         if detail:
             self._next_detail = now + 1 / self._settings.gateway.detail_rate_hz
-        enrolled = self._hub.gallery.current
+        enrolled = self._gallery.enrolled
         stale = self._age(header.tick, header.captured_ms, tick_ms())
         by_keys = now - self._keys_at < KEYS_S
         self._slot = FrameJob(
@@ -272,7 +276,7 @@ class OperatorSession:
         """Command what a held key asks for, and say when nothing comes of it, and why."""
         now = self._keys_at = time.monotonic()
         stale = self._keys_age(jog.tick, 0.0, tick_ms())
-        situation = self._situation(self._hub.gallery.current, now, stale, by_keys=False)
+        situation = self._situation(self._gallery.enrolled, now, stale, by_keys=False)
         decision = self._keys.decide(jog, situation)
         if decision.command is not None:
             self._hub.robot.send(decision.command)
@@ -317,7 +321,7 @@ class OperatorSession:
                 self._take_jog(message)
             case Picture():
                 self._pictures.saw(message.camera, message.tick)
-            case TakeControl() | HandOver():
+            case TakeControl() | HandOver() | UseGallery():
                 self._queue(message)
             case _ if message.type == "stop":
                 self._begin_stop("the stop button was pressed", "button")
@@ -403,6 +407,10 @@ class OperatorSession:
         if isinstance(message, HandOver):
             await self._hub.people.hand_over(self, message.to)
             return
+        if isinstance(message, UseGallery):
+            await self._gallery.choose(message.gallery)
+            self.tell_gallery()
+            return
         match message.type:
             case "release_control":
                 await self.give_up()
@@ -434,6 +442,17 @@ class OperatorSession:
             if text is None:
                 raise _Closing(CLOSE_TOO_SLOW, "the browser reads too slowly")
             await self._socket.send_text(text)
+
+    def tell_gallery(self) -> None:
+        """Send the ``gallery`` message; a session whose gallery is gone uses the shared one."""
+        self._gallery.check()
+        message = {
+            "type": "gallery",
+            "version": self._hub.gallery.version,
+            "gallery": self._gallery.id,
+            "problem": self._hub.keeper.problem,
+        }
+        self.outbox.put(message)
 
     def tell(self, error: FarhandError, seq: int | None = None) -> None:
         """Send an ``error`` message."""

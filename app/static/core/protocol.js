@@ -16,6 +16,7 @@ export const CLIENT_MESSAGES = Object.freeze([
     "keep_control",
     "hand_over",
     "jog",
+    "use_gallery",
 ]);
 
 /** Types of the text messages that the server sends. */
