@@ -118,6 +118,8 @@ class Enrolled:
     matcher: PcaMatcher
     actions: dict[str, Action] = field(default_factory=dict)
     """By the active gesture's name."""
+    ids: dict[str, str] = field(default_factory=dict)
+    """Likewise."""
 
 
 class LiveGallery:
@@ -158,4 +160,5 @@ class LiveGallery:
             for sample in gesture.samples
         ]
         actions = {gesture.name: gesture.action for gesture in gestures if gesture.active}
-        return Enrolled(version, fit(pairs, self._settings), actions)
+        ids = {gesture.name: gesture.id for gesture in gestures if gesture.active}
+        return Enrolled(version, fit(pairs, self._settings), actions, ids)
