@@ -149,7 +149,8 @@ class PcaMatcher:
         first[:, :drawn] = self._rows[:, :drawn]
         views = np.diff(self._starts, append=len(first)).astype(np.float32)
         share = np.square(first).mean(axis=0) / max(float(self._squares.mean()), TINY)
-        return Chart(np.add.reduceat(first, self._starts) / views[:, None], share)
+        middle: F32 = np.add.reduceat(first, self._starts) / views[:, None]
+        return Chart(middle, share)
 
     def _calibrated(self, owner: NDArray[np.intp], of_template: NDArray[np.intp]) -> float:
         """The largest distance accepted, from how the enrolled templates lie to one another.
