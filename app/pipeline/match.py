@@ -147,9 +147,9 @@ class PcaMatcher:
         drawn = min(2, self._basis.shape[1])
         first = np.zeros((len(self._rows), 2), np.float32)
         first[:, :drawn] = self._rows[:, :drawn]
-        views = np.diff(self._starts, append=len(first)).astype(np.float32)
+        views = np.diff(self._starts, append=len(first))
         share = np.square(first).mean(axis=0) / max(float(self._squares.mean()), TINY)
-        middle: F32 = np.add.reduceat(first, self._starts) / views[:, None]
+        middle = (np.add.reduceat(first, self._starts) / views[:, None]).astype(np.float32)
         return Chart(middle, share)
 
     def _calibrated(self, owner: NDArray[np.intp], of_template: NDArray[np.intp]) -> float:
