@@ -23,6 +23,7 @@ export const INITIAL_STATE = Object.freeze({
     stopping: "idle",
     speed: 1, // part of the ordinary speed
     fine: false,
+    glass: false, // whether the glass box is open
 });
 
 /** Changes of the store for `message`; null for messages that change nothing in it. */
