@@ -21,11 +21,12 @@ export function prepare(canvas) {
     return { context, width, height };
 }
 
-/** The colours of drawings, from the constants: {curve, cut, line, text, match}. */
+/** The colours of drawings, from the constants: {ground, curve, cut, line, text, match}. */
 export function colours() {
     const style = getComputedStyle(document.documentElement);
     const named = (name) => style.getPropertyValue(name).trim();
     return {
+        ground: named("--plot-ground"),
         curve: named("--plot-curve"),
         cut: named("--plot-cut"),
         line: named("--plot-line"),

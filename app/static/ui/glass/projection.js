@@ -85,11 +85,11 @@ export function drawProjection(canvas, { gestures, templates, query }, first, se
     for (const [kind, text] of [["second", second], ["first", first]]) {
         if (!text || !groups[kind].length) continue;
         context.fillStyle = look[kind];
-        context.strokeStyle = "#000";
+        context.strokeStyle = paint.ground;
         name(context, text, groups[kind], width, height);
     }
     if (!query) return;
-    context.strokeStyle = "#fff";
+    context.strokeStyle = paint.text;
     context.lineWidth = 2;
     MARKS.you(context, ...place(query));
 }
