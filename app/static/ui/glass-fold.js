@@ -2,6 +2,7 @@
 
 import { texts } from "../texts/en.js";
 import { el, icon, setText, want } from "./dom.js";
+import { showsHand } from "./page.js";
 import { thoughtFor } from "./thought.js";
 
 const SHOW_EVERY_MS = 250; // eyes do not follow thirty sentences a second
@@ -38,10 +39,10 @@ export function glassFold(element, store, { templateUrl }) {
         }
     }
 
-    store.watch(["glass", "source"], ({ glass, source }) => {
-        const open = Boolean(glass) && source.state === "running";
+    store.watch(["glass", "source"], (state) => {
+        const open = state.glass && showsHand(state);
+        element.hidden = !showsHand(state);
         toggle.setAttribute("aria-expanded", String(open));
-        toggle.disabled = source.state !== "running";
         body.hidden = !open;
         element.classList.toggle("is-open", open);
         if (open) fill();

@@ -1,6 +1,7 @@
 // What the recognition makes of the hand, in one sentence: what it says, and why.
 
 import { texts } from "../texts/en.js";
+import { showsHand } from "./page.js";
 
 const words = texts.thought;
 const STALE_MS = 700;
@@ -16,7 +17,7 @@ function nearest(state, now) {
 
 /** One sentence about the newest frame; the robot has no part in it. */
 export function thoughtFor(state, now) {
-    if (state.source.state !== "running") return words.noSource;
+    if (!showsHand(state)) return words.noSource;
     const { frame } = state;
     if (!frame) return words.waiting;
     if (now - state.frameAt > STALE_MS) return words.noFrames;
