@@ -10,6 +10,7 @@ export const INITIAL_STATE = Object.freeze({
     frame: null, // newest `frame` message
     frameAt: -Infinity,
     detail: null, // newest masks, template and distances
+    detailFrame: null, // the frame that it is of
     detailAt: -Infinity,
     gesture: null, // newest `gesture` message
     people: null, // newest `people` message
@@ -33,7 +34,9 @@ export function changesFor(message, state, now) {
             return { hello: message, robot: null, frame: null, detail: null, gesture: null };
         case "frame": {
             const changes = { frame: message, frameAt: now };
-            if (message.detail) Object.assign(changes, { detail: message.detail, detailAt: now });
+            if (message.detail) {
+                Object.assign(changes, { detail: message.detail, detailFrame: message, detailAt: now });
+            }
             return changes;
         }
         case "gesture":

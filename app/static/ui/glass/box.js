@@ -121,7 +121,7 @@ export function glassBox(element, store, { templateUrl }) {
     let busy = false;
     let last = null;
     async function show(state) {
-        const { frame, detail } = state;
+        const { detail, detailFrame: frame } = state;
         if (busy || !state.glass || !frame || !detail || !detail.glass || detail === last) return;
         last = detail;
         busy = true;
