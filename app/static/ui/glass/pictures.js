@@ -118,6 +118,8 @@ export function drawRegion(canvas, { mask, roi }, frame, paint) {
 export function drawTemplate(canvas, { template }) {
     const on = prepare(canvas);
     if (!on || !template) return;
-    on.context.imageSmoothingEnabled = false;
-    bits(on.context, template, on.width, on.height);
+    const { context, width, height } = on;
+    const across = (height * template.width) / template.height;
+    context.imageSmoothingEnabled = false;
+    context.drawImage(template, (width - across) / 2, 0, across, height);
 }
