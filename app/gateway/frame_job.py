@@ -1,24 +1,17 @@
 """The work on one frame, done in a thread: recognise, decide, command, describe."""
 
-import base64
 import time
 from dataclasses import dataclass
 from typing import Any
 
-import cv2
-import numpy as np
-from numpy.typing import NDArray
-
 from app.config import Settings
+from app.gateway.detail import detail, glass
 from app.gateway.drive import Decision, Driver, Situation
 from app.gateway.eyes import FrozenCamera
 from app.gateway.gallery import Enrolled
 from app.gateway.numbers import Counter, tick_ms
 from app.gateway.robot_port import RobotPort
-from app.pipeline import FrameResult, Pipeline
-
-DETAIL_WIDTH = 160
-"""Pixels of the masks in a detail view."""
+from app.pipeline import Pipeline
 
 
 @dataclass(frozen=True)
@@ -34,6 +27,8 @@ class FrameJob:
     situation: Situation
     enrolled: Enrolled
     detail: bool
+    glass: bool = False
+    """With ``detail``: what the glass box shows, too."""
 
 
 @dataclass(frozen=True)
@@ -92,8 +87,11 @@ class FrameWorker:
         frame["gesture"] = result.gesture
         frame["reason"] = decision.reason or result.reason
         frame["doubt"] = decision.doubt
+        # The command is on its way by now: looking on costs the robot no time.
         if job.detail:
-            frame["detail"] = self._detail(result, job.enrolled)
+            frame["detail"] = detail(result, job.enrolled)
+        if job.detail and job.glass:
+            frame["detail"]["glass"] = glass(result, job.enrolled, self._settings.pipeline)
         messages = [frame]
         if result.event is not None:
             event = result.event
@@ -109,29 +107,7 @@ class FrameWorker:
             self._driver.end()
         return gesture_message(event.gesture, event.phase, event.seq)
 
-    def _detail(self, result: FrameResult, enrolled: Enrolled) -> dict[str, Any]:
-        height, width = result.mask.shape
-        small = (DETAIL_WIDTH, max(1, round(DETAIL_WIDTH * height / width)))
-        mask = cv2.resize(result.mask, small, interpolation=cv2.INTER_AREA)
-        template = result.template
-        return {
-            "mask": bit_png(mask),
-            "template": None if template is None else bit_png(template),
-            "distances": {name: round(value, 4) for name, value in result.distances.items()},
-            "threshold": enrolled.matcher.max_distance,
-            "wrist": None if result.wrist is None else result.wrist._asdict(),
-        }
-
 
 def gesture_message(gesture: str, phase: str, seq: int) -> dict[str, Any]:
     """The ``gesture`` message."""
     return {"type": "gesture", "gesture": gesture, "phase": phase, "seq": seq}
-
-
-def bit_png(mask: NDArray[Any]) -> str:
-    """A mask of 0 and 1 as a one-bit PNG in base64; 1 is white."""
-    done, data = cv2.imencode(
-        ".png", np.where(mask, np.uint8(255), np.uint8(0)), [cv2.IMWRITE_PNG_BILEVEL, 1]
-    )
-    assert done
-    return base64.b64encode(data.tobytes()).decode("ascii")

@@ -130,6 +130,11 @@ class Enrolled:
     content: tuple[Gesture, ...] = ()
     """The active gestures."""
 
+    @property
+    def ids(self) -> dict[str, str]:
+        """Ids of the active gestures, by name."""
+        return {gesture.name: gesture.id for gesture in self.content}
+
 
 class LiveGallery:
     """Keeps :class:`Enrolled` of every gallery in use up to date with the database.

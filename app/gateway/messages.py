@@ -85,6 +85,7 @@ class View(_ClientMessage):
 
     type: Literal["view"]
     detail: bool
+    glass: bool = Field(default=False, description="with detail: every step between, too")
 
 
 class Speed(_ClientMessage):

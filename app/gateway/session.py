@@ -115,7 +115,7 @@ class OperatorSession:
         self._age = FrameAge(hub.settings.gateway.max_frame_age_ms)
         self._pictures = PictureAge(hub.settings.gateway.picture_age_ms)
         self._scale = 1.0
-        self._detail = False
+        self._detail = self._glass = False
         self._next_detail = 0.0
 
     async def run(self) -> None:
@@ -254,6 +254,7 @@ class OperatorSession:
             situation=self._situation(enrolled, now, stale, by_keys=by_keys),
             enrolled=enrolled,
             detail=detail,
+            glass=self._glass,
         )
         self._slot_filled.set()
 
@@ -314,7 +315,7 @@ class OperatorSession:
             case Ping():
                 self.outbox.put({"type": "pong", "t": message.t, "tick": tick_ms()})
             case View():
-                self._detail = message.detail
+                self._detail, self._glass = message.detail, message.glass
             case Speed():
                 self._scale = message.scale
             case Jog():

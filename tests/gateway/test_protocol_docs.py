@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
@@ -18,6 +19,7 @@ from app.link import actions
 from app.pipeline import STAGES
 from app.pipeline.burst import KEPT, MAX_FRAMES
 from app.pipeline.confusion import LIKELY, POSSIBLE
+from app.pipeline.types import Cause
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "protocol.md").read_text()
@@ -75,6 +77,11 @@ def test_every_error_code_is_documented() -> None:
 def test_every_stage_is_documented() -> None:
     for stage in (*STAGES, "wait", "total"):
         assert f"`{stage}`" in TEXT, stage
+
+
+def test_every_cause_is_documented() -> None:
+    for cause in get_args(Cause):
+        assert f"`{cause}`" in TEXT, cause
 
 
 def test_every_word_for_what_is_wrong_with_an_image_is_documented() -> None:
