@@ -8,7 +8,7 @@ press; and a press that began before the robot was ready moves nothing.
 from app.gateway.drive import Decision, Situation, obstacle
 from app.gateway.messages import Jog
 from app.gateway.numbers import Counter
-from app.link.messages import Command
+from app.link.messages import Command, Doubt
 
 TOO_EARLY = "this key was pressed before the robot was ready: let go and press it again"
 SHOWN = "a held key"
@@ -53,7 +53,7 @@ class HeldKeys:
         if situation.stale or situation.lease is None or situation.state is None:
             return Decision(reason=reason)
         unseen = jog.action is not None and situation.unseen is not None
-        doubt = "stale_picture" if unseen else None
+        doubt: Doubt | None = "stale_picture" if unseen else None
         command = Command(
             epoch=situation.lease.epoch,
             sequence=self._sequence.next(),
