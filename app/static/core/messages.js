@@ -13,7 +13,9 @@ export const INITIAL_STATE = Object.freeze({
     detailAt: -Infinity,
     gesture: null, // newest `gesture` message
     people: null, // newest `people` message
-    gestures: [],
+    gallery: "shared", // id of the gallery that this page is recognised against
+    galleries: null, // those there are; null until known, and where there is only the shared one
+    gestures: [], // of that gallery
     gesturesState: "loading",
     galleryVersion: 0,
     source: { state: "none" },
@@ -21,6 +23,7 @@ export const INITIAL_STATE = Object.freeze({
     sender: { rate: 0, latencyMs: null, width: 0, height: 0 },
     clipGesture: undefined, // gesture that the synthetic operator shows; undefined: not known
     stopping: "idle",
+    first: null, // how far the first minutes with that gallery have come
     speed: 1, // part of the ordinary speed
     fine: false,
 });

@@ -15,6 +15,7 @@ export const CLIENT_MESSAGES = Object.freeze([
     "ask_control",
     "keep_control",
     "hand_over",
+    "use_gallery",
 ]);
 
 /** Types of the text messages that the server sends. */
