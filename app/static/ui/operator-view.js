@@ -77,7 +77,7 @@ function choice(iconName, title, text, id, onclick) {
     );
 }
 
-/** The two ways to give the robot pictures; also used by the "start driving" sheet. */
+/** The two ways to give the robot pictures; also used when driving starts. */
 export function sourceChoices(element, prefix) {
     return [
         choice("camera", words.useCamera, words.useCameraWords, `${prefix}-camera`, () =>
@@ -89,7 +89,8 @@ export function sourceChoices(element, prefix) {
     ];
 }
 
-function sourceProblem(element, code) {
+/** Why there is no picture, and what to do about it. */
+export function sourceProblem(element, code) {
     const { title, words: text } = texts.sourceErrors[code] || texts.sourceErrors.failed;
     return [
         el(
