@@ -4,6 +4,7 @@ import { active, untaught } from "./plan.js";
 
 export class Round {
     #index;
+    #taught = new Set();
     #last = null; // id of the gesture that was dealt with last
 
     /** All that can be shown; those that were taught or skipped before count as such. */
@@ -16,6 +17,7 @@ export class Round {
                 open.has(id) ? "open" : taught ? "taught" : "skipped",
             ]),
         );
+        for (const [id, status] of this.status) if (status === "taught") this.#taught.add(id);
         this.#index = this.#nextOpen(0);
     }
 
@@ -44,7 +46,9 @@ export class Round {
     settle(status) {
         const { current } = this;
         if (!current) return;
-        this.status.set(current.id, status);
+        if (status === "taught") this.#taught.add(current.id);
+        // To skip one that is taught leaves it so.
+        this.status.set(current.id, this.#taught.has(current.id) ? "taught" : status);
         this.#last = current.id;
         const after = this.#nextOpen(this.#index + 1);
         this.#index = after < this.gestures.length ? after : this.#nextOpen(0);

@@ -157,12 +157,14 @@ export function teachStep({ store, video, progress, templateUrl, act, past, done
         const frame = now - state.frameAt < STALE_MS ? state.frame : null;
         const box = boxOf(frame, state.sender);
         if (busy || round.isOver) {
+            say.dataset.phase = "busy";
             glass.draw(box, 1);
             setText(say, round.isOver ? words.saving : words.looking);
             return;
         }
         const { phase, share } = burst.update(now, { hand: Boolean(box), still: isStill(frame) });
         glass.draw(box, share);
+        say.dataset.phase = phase;
         setText(say, warning() && phase !== "hold" ? warning() : words.phases[phase]);
         if (phase === "taken") judge(round.current);
     }
