@@ -421,6 +421,8 @@ def test_whose_gestures_are_used_is_said_after_each_hello_and_remembered(modules
     back = play("await keeper.greeted(); await keeper.greeted();", **anna)
     assert back["sent"] == [["use_gallery", "g1"]] * 2
     assert (back["gallery"], back["of"]) == ("g1", ["of g1"])
+    watching = play("store.set({ hello: { role: 'observer' } }); await keeper.greeted();", **anna)
+    assert watching["sent"] == []
     chosen = play("await keeper.choose('g1');")
     assert (chosen["sent"], chosen["kept"]) == ([["use_gallery", "g1"]], "g1")
     made = play("await keeper.create('Ben');", **anna)

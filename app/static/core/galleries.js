@@ -31,9 +31,10 @@ export class GalleryKeeper extends EventTarget {
 
     /** The server said hello: it knows nothing of this page yet. */
     async greeted() {
-        const { gallery } = this.#store.state;
+        const { gallery, hello } = this.#store.state;
         this.#asked = null;
-        if (gallery !== SHARED) this.#use(gallery);
+        // An observer's hand is not looked at.
+        if (gallery !== SHARED && !(hello && hello.role === "observer")) this.#use(gallery);
         this.loadGestures();
         await this.list();
     }
