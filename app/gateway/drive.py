@@ -96,10 +96,16 @@ class Driver:
         """The gesture is over: frames stopped coming."""
         self._gesture = None
 
-    def gestures_changed(self) -> None:
-        """A hand that is up may now show another gesture than before."""
+    def gestures_changed(self, *, all_of_them: bool = False) -> None:
+        """A hand that is up may now show another gesture than before.
+
+        Args:
+            all_of_them: These are another person's: what is held now ends, too.
+        """
         self._changed = True
         self._none_since = None
+        if all_of_them and self._gesture is not None:
+            self._barred = _CHANGED
 
     def decide(
         self,

@@ -59,7 +59,7 @@ class FrameWorker:
         self._settings = settings
         self._robot = robot
         self._pipeline = Pipeline(settings.pipeline, enrolled.matcher)
-        self._version = enrolled.version
+        self._enrolled = enrolled
         self._driver = Driver(session, holds)
         self._frozen = FrozenCamera(settings.gateway.frozen_ms)
 
@@ -70,10 +70,11 @@ class FrameWorker:
             FrameRefused: the frame is not what it should be; nothing moves because of it.
         """
         began = time.monotonic()
-        if job.enrolled.version != self._version:
+        if job.enrolled is not self._enrolled:
+            another = job.enrolled.gallery != self._enrolled.gallery
             self._pipeline.matcher = job.enrolled.matcher
-            self._version = job.enrolled.version
-            self._driver.gestures_changed()
+            self._enrolled = job.enrolled
+            self._driver.gestures_changed(all_of_them=another)
         result = self._pipeline(job.jpeg, seq=job.seq, now=job.arrived)
         frozen = self._frozen(result.digest, job.arrived)
         decision = self._driver.decide(

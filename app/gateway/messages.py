@@ -29,6 +29,7 @@ CLIENT_MESSAGES = (
     "ask_control",
     "keep_control",
     "hand_over",
+    "use_gallery",
 )
 SERVER_MESSAGES = ("hello", "frame", "gesture", "robot", "gallery", "people", "pong", "error")
 NEWEST_WINS = frozenset({"frame", "robot", "gallery", "people", "pong"})
@@ -58,6 +59,13 @@ class HandOver(_ClientMessage):
 
     type: Literal["hand_over"]
     to: str = Field(min_length=1, max_length=40, description="its name")
+
+
+class UseGallery(_ClientMessage):
+    """Recognise this session against another gallery; answered with ``gallery``."""
+
+    type: Literal["use_gallery"]
+    gallery: str = Field(min_length=1, max_length=64, description="its id")
 
 
 class View(_ClientMessage):
@@ -90,7 +98,8 @@ class Ping(_ClientMessage):
 
 
 ClientMessage = Annotated[
-    TakeControl | Plain | HandOver | View | Speed | Picture | Ping, Field(discriminator="type")
+    TakeControl | Plain | HandOver | UseGallery | View | Speed | Picture | Ping,
+    Field(discriminator="type"),
 ]
 _CLIENT_MESSAGE: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)
 

@@ -14,6 +14,7 @@ from app.gateway.errors import INTERNAL_MESSAGE
 from app.gateway.eyes import PictureAge
 from app.gateway.frame_age import FrameAge
 from app.gateway.frame_job import FrameDone, FrameJob, FrameWorker
+from app.gateway.gallery_choice import GalleryChoice
 from app.gateway.lease_keeper import LeaseKeeper
 from app.gateway.messages import (
     ClientMessage,
@@ -22,6 +23,7 @@ from app.gateway.messages import (
     Ping,
     Speed,
     TakeControl,
+    UseGallery,
     View,
     error_message,
     parse_client_message,
@@ -87,6 +89,7 @@ class OperatorSession:
         self._worker = FrameWorker(
             self.name, hub.settings, hub.gallery.current, hub.robot, hub.holds
         )
+        self._gallery = GalleryChoice(hub.gallery)
         self._heard_at = time.monotonic()
         self._leases = LeaseKeeper(self.name, hub.robot, hub.ask, self._silent_s, self.tell)
         self._requests: asyncio.Queue[ClientMessage] = asyncio.Queue(MAX_REQUESTS)
@@ -125,6 +128,7 @@ class OperatorSession:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
+            self._gallery.close()
             await asyncio.shield(self._leases.close())
 
     async def _end(self, task: asyncio.Task[None]) -> None:
@@ -160,7 +164,7 @@ class OperatorSession:
             "robot": self._hub.robot.id,
             "session": self.name,
             "version": self._hub.version,
-            "gallery": self._hub.gallery.current.version,
+            "gallery": self._hub.gallery.version,
             "problem": self._hub.keeper.problem,
             "limits": {
                 "frame_bytes": decode.max_bytes,
@@ -228,7 +232,7 @@ class OperatorSession:
         detail = self._detail and now >= self._next_detail
         if detail:
             self._next_detail = now + 1 / self._settings.gateway.detail_rate_hz
-        enrolled = self._hub.gallery.current
+        enrolled = self._gallery.enrolled
         state = self._hub.robot.live_state
         self._slot = FrameJob(
             seq=seq,
@@ -282,7 +286,7 @@ class OperatorSession:
                 self._scale = message.scale
             case Picture():
                 self._pictures.saw(message.camera, message.tick)
-            case TakeControl() | HandOver():
+            case TakeControl() | HandOver() | UseGallery():
                 self._queue(message)
             case _ if message.type == "stop":
                 self._begin_stop("the stop button was pressed", "button")
@@ -368,6 +372,10 @@ class OperatorSession:
         if isinstance(message, HandOver):
             await self._hub.people.hand_over(self, message.to)
             return
+        if isinstance(message, UseGallery):
+            await self._gallery.choose(message.gallery)
+            self.tell_gallery()
+            return
         match message.type:
             case "release_control":
                 await self.give_up()
@@ -399,6 +407,17 @@ class OperatorSession:
             if text is None:
                 raise _Closing(CLOSE_TOO_SLOW, "the browser reads too slowly")
             await self._socket.send_text(text)
+
+    def tell_gallery(self) -> None:
+        """Send the ``gallery`` message; a session whose gallery is gone uses the shared one."""
+        self._gallery.check()
+        message = {
+            "type": "gallery",
+            "version": self._hub.gallery.version,
+            "gallery": self._gallery.id,
+            "problem": self._hub.keeper.problem,
+        }
+        self.outbox.put(message)
 
     def tell(self, error: FarhandError, seq: int | None = None) -> None:
         """Send an ``error`` message."""

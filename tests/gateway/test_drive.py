@@ -276,6 +276,19 @@ def test_a_jog_under_way_goes_on_when_other_gestures_change(driver: Driver) -> N
     assert decision.command.action == ACTIONS["forward"]
 
 
+def test_a_jog_under_way_ends_when_the_gestures_become_another_persons(driver: Driver) -> None:
+    driver.decide("forward", 1, at(0.0))
+    driver.gestures_changed(all_of_them=True)
+    for frame, seconds, gesture in ((2, 0.1, "forward"), (4, 0.2, "forward"), (6, 0.3, "open")):
+        decision = driver.decide(gesture, frame, at(seconds))
+        assert decision.command is not None
+        assert decision.command.action is None
+        assert "the gestures changed while a hand was up" in str(decision.reason)
+        driver.decide(None, frame + 1, at(seconds + 0.05))
+    let_go(driver, 0.4)
+    assert driver.decide("forward", 9, at(1.0)).reason is None
+
+
 @pytest.mark.parametrize("cause", ["no_hand", "unknown_hand", "two_hands", "low_margin"])
 def test_why_no_gesture_is_held_any_more_is_told_to_the_robot(driver: Driver, cause: Cause) -> None:
     held = driver.decide("forward", 1, READY, cause=cause)

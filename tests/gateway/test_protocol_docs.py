@@ -13,6 +13,7 @@ from app.gateway.app import create_app
 from app.gateway.errors import _HTTP_CODES
 from app.gateway.messages import _CLIENT_MESSAGE
 from app.gateway.uploads import MAX_BURST, MAX_IMAGES
+from app.gestures.records import MAX_GALLERIES, MAX_GESTURES
 from app.link import actions
 from app.pipeline import STAGES
 from app.pipeline.burst import KEPT, MAX_FRAMES
@@ -104,6 +105,7 @@ def test_the_limits_are_the_settings() -> None:
     assert settings.gateway.max_burst_bytes == 16 << 20
     assert (MAX_IMAGES, MAX_BURST, MAX_FRAMES, KEPT) == (50, 120, 120, 8)
     assert (LIKELY, POSSIBLE) == (0.9, 0.7)
+    assert (MAX_GALLERIES, MAX_GESTURES) == (100, 500)
     assert settings.gateway.max_bad_messages == 10
     assert settings.gateway.max_sessions == 32
     assert settings.gateway.max_observers == 100
