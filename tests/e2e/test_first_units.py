@@ -151,7 +151,8 @@ def step(page: Page, *, asked: bool = True, taught: str = "", **given: Any) -> s
     gestures = [{**gesture, "taught": gesture["id"] in taught} for gesture in GESTURES]
     source = given.pop("source", {"state": "running", "kind": "camera"})
     galleries = given.pop("galleries", [])
-    state = {"source": source, "galleries": galleries, "gestures": gestures}
+    gallery = given.pop("gallery", "anna")
+    state = {"source": source, "galleries": galleries, "gallery": gallery, "gestures": gestures}
     given = {"state": state, "progress": given, "asked": asked}
     return str(
         run(page, "ui/first/plan.js", f"{PLAN} return m.stepNow(a.state, p, a.asked)", given)
@@ -170,6 +171,8 @@ def test_where_somebody_stands_follows_from_what_was_done(modules: Page) -> None
     assert step(modules, checked=True, taught="abcd") == "drive", "what is retired is not taught"
     assert step(modules, checked=True, taught="abcd", again=True) == "teach"
     assert step(modules, checked=True, taught="abcd", done=True) == "done"
+    assert step(modules, checked=True, gallery="shared") == "drive", "other people's gestures stay"
+    assert step(modules, checked=True, gallery="shared", galleries=None) == "teach"
     drawn = {"state": "running", "kind": "synthetic"}
     assert step(modules, source=drawn, asked=False) == "drive", "the drawn hand is nobody's"
 

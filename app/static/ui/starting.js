@@ -2,7 +2,7 @@
 
 import { texts } from "../texts/en.js";
 import { button, el, want } from "./dom.js";
-import { isReturning, readProgress } from "./first/plan.js";
+import { isOwn, isReturning, readProgress } from "./first/plan.js";
 import { sourceChoices } from "./operator-view.js";
 
 /**
@@ -96,11 +96,11 @@ export class Starting {
                 if (!isReturning(store.state, this.progress.get())) want(this.host, "first");
             },
         });
-        const again = button(texts.first.again, {
-            id: "first-again",
-            onclick: () => this.first(true),
-        });
-        const row = el("div", { class: "row end" }, again);
-        sheets.show("whose", texts.first.whose.title, [...content, row], { focus });
+        if (isOwn(store.state)) {
+            const again = () => this.first(true);
+            const offer = button(texts.first.again, { id: "first-again", onclick: again });
+            content.push(el("div", { class: "row end" }, offer));
+        }
+        sheets.show("whose", texts.first.whose.title, content, { focus });
     }
 }

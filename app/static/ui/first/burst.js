@@ -36,7 +36,10 @@ export class Burst {
     update(now, hand) {
         const said = this.hold.update(now, hand);
         if (said.due < this.#pictures.length) this.#pictures = [];
-        while (this.#pictures.length < said.due) this.#pictures.push(this.#take());
+        while (this.#pictures.length < said.due) {
+            // A camera that is just taken away gives none.
+            this.#pictures.push(this.#take().catch(() => null));
+        }
         return said;
     }
 

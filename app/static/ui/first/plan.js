@@ -48,6 +48,9 @@ export function untaught(gestures, progress) {
     return active(gestures).filter(({ id, taught }) => (again || !taught) && !past.includes(id));
 }
 
+/** Whether what is taught changes nobody else's gestures, or there are no others' to change. */
+export const isOwn = ({ gallery, galleries }) => !galleries || gallery !== "shared";
+
 /** Whether somebody can go straight to driving: it was all done here, or with this gallery elsewhere. */
 export function isReturning({ gallery, gestures }, progress) {
     if (progress.done || progress.again) return progress.done;
@@ -67,7 +70,7 @@ export function stepNow(state, progress, asked) {
     if (state.source.kind !== "synthetic") {
         if (state.galleries && !asked) return "whose";
         if (!progress.checked) return "check";
-        if (untaught(state.gestures, progress).length) return "teach";
+        if (isOwn(state) && untaught(state.gestures, progress).length) return "teach";
     }
     return progress.done ? "done" : "drive";
 }
