@@ -317,6 +317,7 @@ export const texts = Object.freeze({
             intro: "Hold up your hand like the drawing, the palm to the camera.",
             introPlain: "Hold up your hand, the palm to the camera.",
             go: "Go on",
+            left: "I use my left hand",
             good: "Very good. Going on…",
             lines: { light: "Light", distance: "Distance", background: "Background", still: "Stillness" },
             signs: { good: "good", fix: "could be better", wait: "waiting" },

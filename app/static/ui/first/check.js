@@ -16,8 +16,13 @@ const SAY_EVERY_MS = 1500;
 const [WIDTH, HEIGHT] = [64, 48];
 const ICONS = { good: "check", fix: "mode-faulted", wait: "mode-unknown" };
 
-/** Contents of the step. `sign` is a gesture to show: one that stops nothing; `go` goes on. */
-export function checkStep({ store, video, sign, templateUrl, go }) {
+/**
+ * Contents of the step.
+ * @param sign {?object} a gesture to show: one that stops nothing
+ * @param left {boolean} whether the hand is a left one; `toLeft(left)` says so
+ * @param go {function()} goes on
+ */
+export function checkStep({ store, video, sign, templateUrl, left, toLeft, go }) {
     const glass = new Glass(store, video, sign ? drawing(sign, templateUrl) : null);
     const rows = Object.fromEntries(
         LINES.map((what) => {
@@ -36,6 +41,15 @@ export function checkStep({ store, video, sign, templateUrl, go }) {
     const say = el("p", { class: "first-say", role: "status" });
     const bar = el("span", { class: "first-fill" });
     const on = button(words.go, { id: "first-go", onclick: () => go() });
+    const hand = button(words.left, {
+        id: "first-left",
+        "aria-pressed": String(left),
+        onclick: () => {
+            const pressed = hand.getAttribute("aria-pressed") !== "true";
+            hand.setAttribute("aria-pressed", String(pressed));
+            toLeft(pressed);
+        },
+    });
     const steady = new Steady(GOOD_FOR_MS);
     const small = document.createElement("canvas");
     small.width = WIDTH;
@@ -91,7 +105,7 @@ export function checkStep({ store, video, sign, templateUrl, go }) {
             el("div", { class: "first-pair" }, glass.element, el("ul", { class: "first-lines" }, ...Object.values(rows).map(({ row }) => row))),
             el("div", { class: "first-bar", "aria-hidden": "true" }, bar),
             say,
-            el("div", { class: "row end" }, on),
+            el("div", { class: "row end" }, hand, on),
         ],
         focus: on,
         close: () => clearInterval(timer),

@@ -49,7 +49,8 @@ export class FirstMinutes {
 
     /** All over again: the check, the teaching of each gesture, the drive. */
     again() {
-        this.progress.set({ ...FRESH, again: true });
+        const { left } = this.progress.get();
+        this.progress.set({ ...FRESH, left, again: true });
         return this.open();
     }
 
@@ -81,6 +82,7 @@ export class FirstMinutes {
             },
         });
         sheet.dataset.step = step;
+        sheet.classList.toggle("is-left", this.progress.get().left);
     }
 
     /** A picture that is turned off, or the drawn hand instead, leads elsewhere. */
@@ -131,6 +133,11 @@ export class FirstMinutes {
                     video,
                     sign,
                     templateUrl,
+                    left: this.progress.get().left,
+                    toLeft: (left) => {
+                        this.#learn({ left });
+                        document.getElementById("sheet-first").classList.toggle("is-left", left);
+                    },
                     go: () => {
                         this.#learn({ checked: true });
                         this.#next();

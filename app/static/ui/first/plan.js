@@ -6,7 +6,8 @@ const GESTURES_TO_SHOW = 2;
 /**
  * What this browser remembers of one gallery's first minutes; what is taught, the server knows.
  * `past`: ids of gestures that were dealt with here, taught or skipped; `moved`: names of those that
- * moved the arm; `done`: gone through, or known already; `again`: what was taught is taught anew.
+ * moved the arm; `done`: gone through, or known already; `again`: what was taught is taught anew;
+ * `left`: the hand is a left one.
  */
 export const FRESH = Object.freeze({
     begun: false,
@@ -16,6 +17,7 @@ export const FRESH = Object.freeze({
     stopped: false,
     done: false,
     again: false,
+    left: false,
 });
 
 /** Progress from what was kept; anything else is none. */
@@ -36,6 +38,7 @@ export function readProgress(text) {
         stopped: kept.stopped === true,
         done: kept.done === true,
         again: kept.again === true,
+        left: kept.left === true,
     };
 }
 
