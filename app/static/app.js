@@ -427,7 +427,7 @@ const wishes = {
     "reset-scene": askResetScene,
     help: () => {
         if (sheets.name === "help") sheets.close();
-        else sheets.show("help", texts.help.title, helpContent(checkBrowser));
+        else sheets.show("help", texts.help.title, helpContent(() => starting.first(true), checkBrowser));
     },
     "edit-gesture": ({ id }) => {
         const gesture = store.state.gestures.find((candidate) => candidate.id === id);
