@@ -166,7 +166,12 @@ link.addEventListener("message", ({ detail: message }) => {
             notices.show(texts.people.yours, { kind: "good", name: "control" });
         }
         describeRobot();
-    } else if (message.type === "frame") sender.answered(message.seq);
+    } else if (message.type === "frame") {
+        sender.answered(message.seq);
+        const { width, height } = sender;
+        const { frameSize } = store.state;
+        if (frameSize.width !== width || frameSize.height !== height) store.set({ frameSize: { width, height } });
+    }
     else if (message.type === "gallery") {
         tellProblem(message.problem);
         galleries.heard(message);

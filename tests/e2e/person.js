@@ -4,7 +4,7 @@
 (() => {
     if (window.top !== window) return;
     const LOWERED_MS = 500;
-    const PUZZLED_MS = 1500; // the page waits for another hand, and this one is up: show it again
+    const PUZZLED_MS = 1500; // the hand is up, and nothing comes of it: show it again
     const images = Object.fromEntries(
         Object.entries(HANDS).map(([name, data]) => {
             const image = new Image();
@@ -30,7 +30,11 @@
         const asked = found ? found[1] : null;
         if (asked !== person.wanted) person.show(asked);
         const say = sheet && sheet.querySelector("[data-phase]");
-        if (!say || say.dataset.phase !== "change" || !person.shown) person.waitsSince = now;
+        const robot = window.farhand && window.farhand.robot;
+        const ignored = say
+            ? say.dataset.phase === "change"
+            : sheet && sheet.dataset.step === "drive" && robot && robot.mode !== "moving";
+        if (!ignored || !person.shown) person.waitsSince = now;
         else if (now - person.waitsSince > PUZZLED_MS) person.show(asked);
     }
 

@@ -224,22 +224,29 @@ def test_the_guided_drive_asks_for_one_thing_after_another(modules: Page) -> Non
 
 
 def test_what_was_learnt_needs_a_gesture_that_moved_the_arm(modules: Page) -> None:
-    def learn(robot: Any, gesture: Any, drives: bool = True, **progress: Any) -> tuple[Any, Any]:
-        state = {"robot": robot, "gesture": gesture}
-        given = {"state": state, "drives": drives, "progress": progress}
-        script = f"{PLAN} const n = m.learn(a.state, a.drives, p); return [n.moved, n.stopped]"
-        moved, stopped = run(modules, "ui/first/plan.js", script, given)
-        return moved, stopped
+    def moved_by(robot: Any, gesture: Any, drives: bool = True) -> Any:
+        given = {"state": {"robot": robot, "gesture": gesture}, "drives": drives}
+        return run(modules, "ui/first/plan.js", "return m.movedBy(a.state, a.drives)", given)
 
     moving = {"mode": "moving", "action": {"type": "home"}}
     up = {"gesture": "up", "phase": "hold"}
-    assert learn(moving, up) == (["up"], False)
-    assert learn(moving, up, moved=["up"]) == (["up"], False)
-    assert learn(moving, up, drives=False) == ([], False)
-    assert learn({"mode": "armed"}, up) == ([], False)
-    assert learn(moving, {"gesture": "up", "phase": "end"}) == ([], False)
-    assert learn({"mode": "stopped"}, None) == ([], False), "too early: nothing moved yet"
-    assert learn({"mode": "stopped"}, None, moved=["up", "left"]) == (["up", "left"], True)
+    assert moved_by(moving, up) == "up"
+    assert moved_by(moving, up, drives=False) is None
+    assert moved_by({"mode": "armed"}, up) is None
+    assert moved_by(moving, {"gesture": "up", "phase": "end"}) is None
+    assert moved_by(None, up) is None
+
+    def learn(mode: str, seen: str | None, **progress: Any) -> tuple[Any, Any]:
+        given = {"robot": {"mode": mode}, "seen": seen, "progress": progress}
+        script = f"{PLAN} const n = m.learn(a, a.seen, p); return [n.moved, n.stopped]"
+        moved, stopped = run(modules, "ui/first/plan.js", script, given)
+        return moved, stopped
+
+    assert learn("moving", "up") == (["up"], False)
+    assert learn("moving", "up", moved=["up"]) == (["up"], False)
+    assert learn("moving", None) == ([], False)
+    assert learn("stopped", None) == ([], False), "too early: nothing moved yet"
+    assert learn("stopped", None, moved=["up", "left"]) == (["up", "left"], True)
 
 
 def test_two_different_ways_to_move_are_suggested_and_never_the_stop(modules: Page) -> None:

@@ -9,6 +9,7 @@ export const INITIAL_STATE = Object.freeze({
     wasArmed: false, // whether this session was armed since it took control
     frame: null, // newest `frame` message
     frameAt: -Infinity,
+    frameSize: { width: 0, height: 0 }, // of the frame it is about, pixels
     detail: null, // newest masks, template and distances
     detailAt: -Infinity,
     gesture: null, // newest `gesture` message

@@ -87,9 +87,9 @@ export function checkStep({ store, video, sign, templateUrl, left, toLeft, go })
         const now = performance.now();
         const { state } = store;
         const frame = now - state.frameAt < STALE_MS ? state.frame : null;
-        const box = boxOf(frame, state.sender);
+        const box = boxOf(frame, state.frameSize);
         look(now, box);
-        const lines = judge(measured, frame, state.sender);
+        const lines = judge(measured, frame, state.frameSize);
         const share = steady.update(now, allGood(lines));
         show(lines, now);
         glass.draw(box, share);

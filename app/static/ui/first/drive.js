@@ -4,10 +4,12 @@ import { texts } from "../../texts/en.js";
 import { button, el, icon, setText } from "../dom.js";
 import { isDriving } from "../page.js";
 import { drawing, signOf } from "./drawing.js";
-import { driveTask, learn, suggested } from "./plan.js";
+import { Steady } from "./hold.js";
+import { driveTask, learn, movedBy, suggested } from "./plan.js";
 
 const words = texts.first.drive;
 const TICK_MS = 100;
+const SEEN_MS = 700; // a shorter motion is not noticed
 const LIST = ["control", "arm", "show", "stop", "reset"];
 const POINTS_AT = { reset: "btn-reset", ask: "btn-control", control: "btn-control", arm: "btn-arm", stop: "stop" };
 
@@ -37,6 +39,8 @@ export function driveStep({ store, templateUrl, progress, keep, done }) {
         el("li", { data: { task } }, el("span", { class: "step-mark" }, icon("check")), el("span", { text: words.list[task] })),
     );
     const last = button(words.finish, { id: "first-finish", class: "primary", hidden: true, onclick: () => done() });
+    const moving = new Steady(SEEN_MS);
+    let mover = null;
     let pictured = null;
     let pointed = null;
 
@@ -54,11 +58,20 @@ export function driveStep({ store, templateUrl, progress, keep, done }) {
         model.replaceChildren(...(gesture ? [drawing(gesture, templateUrl), el("p", { class: "quiet", text: signOf(gesture) })] : []));
     }
 
+    /** The gesture that moved the arm long enough to be seen. */
+    function seen(name) {
+        if (name && name !== mover) {
+            mover = name;
+            moving.reset();
+        }
+        return moving.update(performance.now(), name !== null) >= 1 ? mover : null;
+    }
+
     function tick() {
         const { state } = store;
         const drives = isDriving(state);
         const before = progress();
-        const after = learn(state, drives, before);
+        const after = learn(state, seen(movedBy(state, drives)), before);
         if (after !== before) keep(after);
         const task = driveTask(state.robot, drives, after);
         const synthetic = state.source.kind === "synthetic";

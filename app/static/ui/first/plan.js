@@ -110,14 +110,20 @@ export function driveTask(robot, drives, progress) {
     return robot.armed ? "show" : "arm";
 }
 
-/** Progress after what the robot does now; the same object when nothing was learnt. */
-export function learn(state, drives, progress) {
-    const { robot, gesture } = state;
+/** Name of the gesture that moves the arm now, or null. */
+export function movedBy({ robot, gesture }, drives) {
+    const shown = gesture && gesture.phase !== "end" ? gesture.gesture : null;
+    return drives && robot && robot.mode === "moving" && robot.action ? shown : null;
+}
+
+/**
+ * Progress after what the robot does now; the same object when nothing was learnt.
+ * `seen`: name of a gesture that moved the arm for long enough to be seen, or null
+ */
+export function learn({ robot }, seen, progress) {
     if (!robot) return progress;
     const shown = progress.moved.length >= GESTURES_TO_SHOW;
     if (shown && robot.mode === "stopped" && !progress.stopped) return { ...progress, stopped: true };
-    const name = gesture && gesture.phase !== "end" ? gesture.gesture : null;
-    const moves = drives && robot.mode === "moving" && robot.action && name;
-    if (shown || !moves || progress.moved.includes(name)) return progress;
-    return { ...progress, moved: [...progress.moved, name] };
+    if (shown || !seen || progress.moved.includes(seen)) return progress;
+    return { ...progress, moved: [...progress.moved, seen] };
 }

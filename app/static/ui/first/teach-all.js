@@ -155,7 +155,7 @@ export function teachStep({ store, video, progress, templateUrl, act, past, done
         const now = performance.now();
         const { state } = store;
         const frame = now - state.frameAt < STALE_MS ? state.frame : null;
-        const box = boxOf(frame, state.sender);
+        const box = boxOf(frame, state.frameSize);
         if (busy || round.isOver) {
             say.dataset.phase = "busy";
             glass.draw(box, 1);
