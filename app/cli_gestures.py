@@ -225,13 +225,18 @@ def draw_starter_set(
 
 def draw_operator(
     folder: Annotated[
-        Path, typer.Argument(help="Folder for operator.webm and operator.json.")
+        Path, typer.Argument(help="Folder for operator.webm, operator.json and hands/.")
     ] = Path("app/static/media"),
 ) -> None:
-    """Draw the synthetic operator that the page plays when there is no camera, as it is shipped."""
+    """Draw what the page shows of hands, as it is shipped.
+
+    The synthetic operator that it plays when there is no camera, and how each gesture is held.
+    """
+    from app.gestures.drawings import write_drawings
     from app.gestures.synthetic import operator_clip
 
-    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "hands").mkdir(parents=True, exist_ok=True)
+    write_drawings(folder / "hands")
     captions = operator_clip(folder / "operator.webm")
     rows = [caption._asdict() for caption in captions]
     (folder / "operator.json").write_text(json.dumps(rows, indent=1) + "\n", "utf-8")

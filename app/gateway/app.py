@@ -1,6 +1,7 @@
 """The application: every route, behind one door."""
 
 import asyncio
+import mimetypes
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -159,6 +160,7 @@ def create_app(
     ):
         app.include_router(router)
     app.add_api_websocket_route("/ws/operator", operator_socket)
+    mimetypes.add_type("image/webp", ".webp")  # not known on every system
     # The video is compressed already, and browsers ask for parts of it.
     app.mount("/static/media", StaticFiles(directory=STATIC / "media"), name="media")
     app.mount("/static", GZipMiddleware(StaticFiles(directory=STATIC), 1024), name="static")

@@ -3,10 +3,12 @@
 import { api } from "./core/api.js";
 import { CameraFeed } from "./core/camera-feed.js";
 import { FrameSender } from "./core/frame-sender.js";
+import { GalleryKeeper } from "./core/galleries.js";
 import { GamepadReader } from "./core/gamepad.js";
 import { Held } from "./core/held.js";
+import { grabStill, Stills } from "./core/jpeg.js";
 import { Latency } from "./core/latency.js";
-import { grabStill } from "./core/jpeg.js";
+import { memory } from "./core/memory.js";
 import { changesFor, INITIAL_STATE } from "./core/messages.js";
 import { OperatorLink } from "./core/operator-link.js";
 import { preflight } from "./core/preflight.js";
@@ -22,7 +24,7 @@ import { connection, driver, goneOverlay, statePill } from "./ui/header.js";
 import { keys } from "./ui/keys.js";
 import { latencyBar } from "./ui/latency-bar.js";
 import { Notices } from "./ui/notices.js";
-import { operatorView, sourceChoices } from "./ui/operator-view.js";
+import { operatorView } from "./ui/operator-view.js";
 import { isDriving, keepRootClasses, preparePage } from "./ui/page.js";
 import { askingNotice, takeOverContent } from "./ui/people.js";
 import { preflightContent } from "./ui/preflight.js";
@@ -31,31 +33,16 @@ import { sentence } from "./ui/sentence.js";
 import { askContent, goneContent, helpContent, Sheets } from "./ui/sheets.js";
 import { knownSpeed, speed, speedOf } from "./ui/speed.js";
 import { stage } from "./ui/stage.js";
+import { Starting } from "./ui/starting.js";
+import { whoseBar } from "./ui/whose-bar.js";
 import { describeError } from "./ui/words.js";
 
 const byId = (id) => document.getElementById(id);
 
-/** Small choices that outlive the page; a browser may refuse to keep them. */
-const memory = {
-    get(key) {
-        try {
-            return localStorage.getItem(`farhand-${key}`);
-        } catch {
-            return null;
-        }
-    },
-    set(key, value) {
-        try {
-            localStorage.setItem(`farhand-${key}`, value);
-        } catch {
-            // Then it is forgotten.
-        }
-    },
-};
-
 preparePage(document);
 const store = new Store(INITIAL_STATE);
 const link = new OperatorLink();
+const galleries = new GalleryKeeper(link, api, store, memory);
 const robotId = () => {
     const robot = store.state.hello && store.state.hello.robot;
     return robot && typeof robot === "object" ? robot.id : robot || null;
@@ -103,6 +90,27 @@ latencyBar(byId("stage"), reading);
 
 const sender = new FrameSender(link, video);
 const source = new SourceKeeper(video, store, sender);
+let stills = null;
+const starting = new Starting({
+    host: root,
+    sheets,
+    store,
+    memory,
+    video,
+    source,
+    galleries,
+    templateUrl: api.templateUrl,
+    act: {
+        takeControl,
+        disarm: () => link.send("disarm"),
+        take: () => (stills ||= new Stills()).take(video),
+        check: (pictures) => api.checkGesture(pictures, store.state.gallery),
+        save: (gesture, pictures) => api.replaceSamples(gesture.id, pictures),
+        told: (text) => notices.show(text, { kind: "good", name: "first" }),
+    },
+});
+whoseBar(byId("whose"), store);
+galleries.addEventListener("lost", () => notices.show(texts.first.whose.lost, { kind: "bad", name: "whose" }));
 
 // Who drives by keys
 
@@ -203,9 +211,14 @@ link.addEventListener("message", ({ detail: message }) => {
         describeRobot();
     } else if (message.type === "frame") {
         latency.frame(message, sender.answered(message.seq), performance.now());
+        const { width, height } = sender;
+        const { frameSize } = store.state;
+        if (frameSize.width !== width || frameSize.height !== height) {
+            store.set({ frameSize: { width, height } });
+        }
     } else if (message.type === "gallery") {
         tellProblem(message.problem);
-        loadGestures();
+        galleries.heard(message);
     }
     else if (message.type === "error") refused(message);
 });
@@ -220,7 +233,7 @@ function greeted() {
     describedAt = -Infinity;
     describeRobot();
     tellProblem(store.state.hello.problem);
-    loadGestures();
+    galleries.greeted();
     // Somebody pressed STOP and nobody heard: say it again, first of all.
     if (stopper.state === "failed") stopper.stop();
     for (const feed of Object.values(feeds)) feed.retryNow();
@@ -228,6 +241,7 @@ function greeted() {
 
 function refused(message) {
     lastError = message;
+    if (galleries.refused(message)) return;
     if (message.code === "control_kept") asked = false;
     if (Number.isFinite(message.seq) && message.seq !== null) {
         sender.answered(message.seq);
@@ -260,20 +274,6 @@ async function describeRobot() {
         }
     } catch {
         // Not there yet; the read-out does without limits until then.
-    }
-}
-
-let gesturesRun = 0;
-
-async function loadGestures() {
-    const run = ++gesturesRun;
-    try {
-        const answer = await api.gestures();
-        if (run !== gesturesRun) return;
-        const version = store.state.galleryVersion + 1;
-        store.set({ gestures: answer, gesturesState: "ready", galleryVersion: version });
-    } catch {
-        if (run === gesturesRun) store.set({ gesturesState: "failed" });
     }
 }
 
@@ -387,31 +387,6 @@ function toggleArm() {
     link.send(store.state.robot.armed ? "disarm" : "arm");
 }
 
-async function chooseSource(wanted) {
-    const starting = sheets.name === "start";
-    if (starting) sheets.close();
-    if (wanted.kind === "none") {
-        source.stop();
-        return;
-    }
-    await source.start(wanted);
-    const { robot } = store.state;
-    // "Start driving" goes on by itself as far as nothing can move yet.
-    const free = robot && !robot.fault && !robot.controller;
-    if (starting && free && store.state.source.state === "running") {
-        takeControl();
-    }
-}
-
-function start() {
-    const host = byId("sheets");
-    const choices = sourceChoices(host, "start");
-    const box = document.createElement("div");
-    box.className = "choices-row";
-    box.append(...choices);
-    sheets.show("start", texts.actions.start, box, { focus: choices[0] });
-}
-
 async function teach(gesture = null) {
     // Loaded when first needed: most who drive never teach.
     const { teachContent } = await import("./ui/teach.js");
@@ -420,10 +395,10 @@ async function teach(gesture = null) {
         store,
         video,
         grab: () => grabStill(video),
-        recognise: api.recognise,
+        recognise: (picture) => api.recognise(picture, store.state.gallery),
         templateUrl: api.templateUrl,
         act: {
-            create: api.createGesture,
+            create: (...gesture) => api.createGesture(...gesture, store.state.gallery),
             update: api.updateGesture,
             addSamples: api.addSamples,
             remove: api.deleteGesture,
@@ -434,7 +409,7 @@ async function teach(gesture = null) {
         done(text) {
             sheets.close();
             notices.show(text, { kind: "good" });
-            loadGestures();
+            galleries.loadGestures();
         },
     });
     const title = gesture ? texts.teach.editTitle(gesture.name) : texts.teach.title;
@@ -482,9 +457,11 @@ stopper.addEventListener("state", ({ detail }) => {
 
 const wishes = {
     stop: () => stopper.stop(),
-    start,
+    start: () => starting.start(),
+    first: () => starting.first(),
+    whose: () => starting.whose(),
     reset,
-    source: chooseSource,
+    source: (wanted) => starting.choose(wanted),
     swap: () => views.swap(),
     "toggle-control": toggleControl,
     "keep-control": () => link.send("keep_control"),
@@ -506,7 +483,7 @@ const wishes = {
     "reset-scene": askResetScene,
     help: () => {
         if (sheets.name === "help") sheets.close();
-        else sheets.show("help", texts.help.title, helpContent(checkBrowser));
+        else sheets.show("help", texts.help.title, helpContent(() => starting.first(true), checkBrowser));
     },
     "edit-gesture": ({ id }) => {
         const gesture = store.state.gestures.find((candidate) => candidate.id === id);

@@ -2,13 +2,17 @@
 
 import os
 import shutil
+import threading
 from collections.abc import Callable, Iterator
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, Playwright, sync_playwright
 
-from tests.e2e.running import BASE_ARGUMENTS, Server, start_server, stop_server
+from tests.e2e.running import BASE_ARGUMENTS, STATIC, Server, start_server, stop_server
 
 ARTIFACTS = Path(__file__).parents[2] / "test-artifacts"
 
@@ -37,6 +41,28 @@ def chromium() -> str:
             pytest.fail(reason)
         pytest.skip(reason)
     return path
+
+
+class _Quiet(SimpleHTTPRequestHandler):
+    def log_message(self, format: str, *args: Any) -> None:
+        pass
+
+
+@pytest.fixture(scope="module")
+def modules(playwright: Playwright, chromium: str) -> Iterator[Page]:
+    """An HTML page (the server's "not found") of the same origin as the modules."""
+    handler = partial(_Quiet, directory=str(STATIC.parent))
+    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    thread = threading.Thread(target=server.serve_forever, daemon=True)
+    thread.start()
+    browser = playwright.chromium.launch(executable_path=chromium, args=list(BASE_ARGUMENTS))
+    page = browser.new_page()
+    page.goto(f"http://127.0.0.1:{server.server_address[1]}/none")
+    yield page
+    browser.close()
+    server.shutdown()
+    server.server_close()
+    thread.join()
 
 
 OpenPage = Callable[..., Page]

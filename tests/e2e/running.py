@@ -6,12 +6,14 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import httpx
 import psutil
 from playwright.sync_api import Page
 
 ROOT = Path(__file__).parents[2]
+STATIC = ROOT / "app" / "static"
 TOKEN = "end-to-end-token-0123456789abcdef"
 BASE_ARGUMENTS = [
     "--no-sandbox",
@@ -106,3 +108,10 @@ def wait_for(page: Page, expression: str, seconds: float = 60.0) -> None:
             robot = page.evaluate("JSON.stringify(window.farhand?.robot)")
             raise TimeoutError(f"not true within {seconds:g} s: {expression}\nrobot: {robot}")
         page.wait_for_timeout(20)
+
+
+def run(page: Page, module: str, script: str, argument: Any = None) -> Any:
+    """Evaluate ``script`` with the exports of ``module`` as ``m`` and ``argument`` as ``a``."""
+    return page.evaluate(
+        f"async (a) => {{ const m = await import('/static/{module}'); {script} }}", argument
+    )

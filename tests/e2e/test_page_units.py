@@ -5,15 +5,10 @@ import itertools
 import json
 import re
 import struct
-import threading
-from collections.abc import Iterator
-from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
-from pathlib import Path
 from typing import Any, get_args
 
 import pytest
-from playwright.sync_api import Page, Playwright
+from playwright.sync_api import Page
 
 from app.config import DecodeSettings
 from app.gateway.messages import CLIENT_MESSAGES, SERVER_MESSAGES
@@ -22,39 +17,9 @@ from app.link.header import HEADER_SIZE, FrameHeader
 from app.link.messages import COMMAND_TTL_MS, Doubt
 from app.pipeline.types import Cause
 from app.robot.controller import DOUBTS
-from tests.e2e.running import BASE_ARGUMENTS
+from tests.e2e.running import STATIC, run
 
-STATIC = Path(__file__).parents[2] / "app" / "static"
 SCRIPTS = sorted(STATIC.rglob("*.js"))
-
-
-class _Quiet(SimpleHTTPRequestHandler):
-    def log_message(self, format: str, *args: Any) -> None:
-        pass
-
-
-@pytest.fixture(scope="module")
-def modules(playwright: Playwright, chromium: str) -> Iterator[Page]:
-    """An HTML page (the server's "not found") of the same origin as the modules."""
-    handler = partial(_Quiet, directory=str(STATIC.parent))
-    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    thread = threading.Thread(target=server.serve_forever, daemon=True)
-    thread.start()
-    browser = playwright.chromium.launch(executable_path=chromium, args=list(BASE_ARGUMENTS))
-    page = browser.new_page()
-    page.goto(f"http://127.0.0.1:{server.server_address[1]}/none")
-    yield page
-    browser.close()
-    server.shutdown()
-    server.server_close()
-    thread.join()
-
-
-def run(page: Page, module: str, script: str, argument: Any = None) -> Any:
-    """Evaluate ``script`` with the exports of ``module`` as ``m`` and ``argument`` as ``a``."""
-    return page.evaluate(
-        f"async (a) => {{ const m = await import('/static/{module}'); {script} }}", argument
-    )
 
 
 def test_message_names_agree_with_the_server(modules: Page) -> None:
@@ -269,7 +234,7 @@ def test_nothing_foreign_and_nothing_inline() -> None:
     html = (STATIC / "index.html").read_text()
     assert not re.search(r"\sstyle=|<style|\son\w+=|<script(?![^>]*\ssrc=)", html)
     for path in STATIC.rglob("*.*"):
-        if path.suffix == ".webm":
+        if path.suffix in (".webm", ".webp"):
             continue
         text = path.read_text().replace("http://www.w3.org/2000/svg", "")
         assert not re.search(r"https?://\w", text), path

@@ -44,6 +44,14 @@ function imageForm(images) {
     return form;
 }
 
+/** The shared gallery is what is meant where none is named; servers without others know no name. */
+const isNamed = (gallery) => Boolean(gallery) && gallery !== "shared";
+
+function inGallery(form, gallery) {
+    if (isNamed(gallery)) form.append("gallery", gallery);
+    return form;
+}
+
 export const api = Object.freeze({
     robots: () => request("GET", "api/robots"),
     robot: (robot) => request("GET", `api/robots/${id(robot)}`),
@@ -54,9 +62,12 @@ export const api = Object.freeze({
     resetRobot: (robot) => request("POST", `api/robots/${id(robot)}/reset`),
     /** When which gesture is shown by the synthetic operator: [{start_s, end_s, gesture}]. */
     operatorCaptions: () => request("GET", "static/media/operator.json"),
-    gestures: () => request("GET", "api/gestures"),
-    createGesture(name, action, images) {
-        const form = imageForm(images);
+    galleries: () => request("GET", "api/galleries"),
+    createGallery: (name) => request("POST", "api/galleries", { json: { name } }),
+    gestures: (gallery) =>
+        request("GET", isNamed(gallery) ? `api/gestures?gallery=${id(gallery)}` : "api/gestures"),
+    createGesture(name, action, images, gallery) {
+        const form = inGallery(imageForm(images), gallery);
         form.append("name", name);
         form.append("action", JSON.stringify(action));
         return request("POST", "api/gestures", { body: form });
@@ -72,11 +83,19 @@ export const api = Object.freeze({
             json: { action, from },
             timeoutMs: 35000,
         }),
+    /** Judge pictures as enrolment would; nothing is stored. */
+    checkGesture: (images, gallery) =>
+        request("POST", "api/gestures/check", { body: inGallery(imageForm(images), gallery) }),
     addSamples: (gesture, images) =>
         request("POST", `api/gestures/${id(gesture)}/samples`, { body: imageForm(images) }),
+    /** The same, in place of all samples that there are. */
+    replaceSamples: (gesture, images) =>
+        request("POST", `api/gestures/${id(gesture)}/samples?replace=true`, {
+            body: imageForm(images),
+        }),
     deleteGesture: (gesture) => request("DELETE", `api/gestures/${id(gesture)}`),
-    recognise(image) {
-        const form = new FormData();
+    recognise(image, gallery) {
+        const form = inGallery(new FormData(), gallery);
         form.append("image", image, "still.jpg");
         return request("POST", "api/recognise", { body: form });
     },

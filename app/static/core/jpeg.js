@@ -89,13 +89,32 @@ export class JpegEncoder {
     }
 }
 
+/** Stills of good quality, one after another. */
+export class Stills {
+    #encoder = new JpegEncoder();
+    #last = Promise.resolve();
+
+    /** The video's picture as a JPEG Blob, taken when those asked for before are; null before the first. */
+    take(video, quality = 0.92) {
+        const taken = this.#last.then(async () => {
+            const still = await this.#encoder.encode(video, quality);
+            return still && new Blob([still.jpeg], { type: "image/jpeg" });
+        });
+        this.#last = taken.catch(() => {});
+        return taken;
+    }
+
+    close() {
+        this.#last.then(() => this.#encoder.close());
+    }
+}
+
 /** One still of `video` as a JPEG Blob; null before the first picture. */
 export async function grabStill(video, quality = 0.92) {
-    const encoder = new JpegEncoder();
+    const stills = new Stills();
     try {
-        const still = await encoder.encode(video, quality);
-        return still && new Blob([still.jpeg], { type: "image/jpeg" });
+        return await stills.take(video, quality);
     } finally {
-        encoder.close();
+        stills.close();
     }
 }

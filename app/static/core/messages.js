@@ -9,13 +9,16 @@ export const INITIAL_STATE = Object.freeze({
     wasArmed: false, // whether this session was armed since it took control
     frame: null, // newest `frame` message
     frameAt: -Infinity,
+    frameSize: { width: 0, height: 0 }, // of the frame it is about, pixels
     detail: null, // newest masks, template and distances
     detailFrame: null, // the frame that it is of
     detailAt: -Infinity,
     gesture: null, // newest `gesture` message
     jog: null, // newest `jog` message: why nothing comes of what is held
     people: null, // newest `people` message
-    gestures: [],
+    gallery: "shared", // id of the gallery that this page is recognised against
+    galleries: null, // those there are; null until known, and where there is only the shared one
+    gestures: [], // of that gallery
     gesturesState: "loading",
     galleryVersion: 0,
     source: { state: "none" },
@@ -23,6 +26,7 @@ export const INITIAL_STATE = Object.freeze({
     sender: { rate: 0, latencyMs: null, width: 0, height: 0 },
     clipGesture: undefined, // gesture that the synthetic operator shows; undefined: not known
     stopping: "idle",
+    first: null, // how far the first minutes with that gallery have come
     speed: 1, // part of the ordinary speed
     fine: false,
     glass: false, // whether the glass box is open

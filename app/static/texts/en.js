@@ -2,6 +2,12 @@
 
 export const language = "en";
 
+/** A whole sentence from the server's plain words; "" stays "". */
+const sentence = (text) => {
+    const clean = String(text || "").trim().replace(/[.\s]+$/, "");
+    return clean ? `${clean[0].toUpperCase()}${clean.slice(1)}.` : "";
+};
+
 const plural = (count, one, many) => `${count} ${count === 1 ? one : many}`;
 
 export const texts = Object.freeze({
@@ -392,6 +398,176 @@ export const texts = Object.freeze({
         edit: (name) => `Change “${name}”`,
         match: "Recognised",
         noDistance: "–",
+    },
+
+    first: {
+        begin: "First minutes",
+        goOn: "Go on with the first minutes",
+        again: "Teach all of them again",
+        known: "I know how: drive",
+        welcome:
+            "In about two minutes you drive the arm with your own hand. You can leave at any moment, " +
+            "and go on later where you left.",
+        disarmed: "Disarmed, so that what you show moves nothing.",
+        steps: "First minutes",
+        stepNames: {
+            source: "Picture",
+            whose: "Name",
+            check: "Check",
+            teach: "Teach",
+            drive: "Drive",
+        },
+        titles: {
+            source: "Your first minutes",
+            whose: "Whose hand is it?",
+            check: "Is your hand seen well?",
+            teach: "Teach your gestures",
+            drive: "Drive the arm",
+        },
+        drawingOf: (name) => `How to hold the hand for “${name}”`,
+        // How the starter gestures are held, the palm to the camera.
+        signs: {
+            forward: "Index and middle finger up",
+            back: "Four fingers up, the thumb in the palm",
+            left: "A fist with the thumb out",
+            right: "The little finger up",
+            up: "The index finger up",
+            down: "Index and little finger up",
+            open: "The index finger up, the thumb out",
+            close: "A fist",
+            home: "The little finger up, the thumb out",
+            stop: "The open hand, the thumb out",
+        },
+
+        whose: {
+            title: "Whose hand is it?",
+            open: (name) => `Whose hand: ${name}`,
+            intro: "Hands differ. Each person teaches their own gestures once, and chooses them here.",
+            newName: "Your name",
+            nameMissing: "Give a name.",
+            add: "Begin",
+            known: "People who are known here",
+            shared: "Anybody",
+            sharedWords: "The gestures that everybody shares",
+            taught: (taught, all) => `${taught} of ${all} gestures taught`,
+            lost: "Those gestures were deleted on the server. The shared ones are used now.",
+        },
+
+        check: {
+            intro: "Hold up your hand like the drawing, the palm to the camera.",
+            introPlain: "Hold up your hand, the palm to the camera.",
+            go: "Go on",
+            left: "I use my left hand",
+            good: "Very good. Going on…",
+            lines: { light: "Light", distance: "Distance", background: "Background", still: "Stillness" },
+            signs: { good: "good", fix: "could be better", wait: "waiting" },
+            advice: {
+                light: {
+                    wait: "Waiting for the picture.",
+                    dark: "Too dark. Turn on a lamp before you, or turn to the window.",
+                    glare: "Too bright. Turn away from the lamp, or close a curtain.",
+                    behind: "The light is behind you. Turn so that it falls on your hand.",
+                    good: "Enough light.",
+                },
+                distance: {
+                    wait: "Waiting for the picture.",
+                    none: "No hand is seen yet. Hold it up, a forearm's length from the camera.",
+                    cut: "Your hand runs out of the picture. Move it to the middle.",
+                    far: "Too far away. Come closer.",
+                    near: "Too close. Move back a little.",
+                    aside: "Move your hand to the middle of the picture.",
+                    good: "Your whole hand is in the picture.",
+                },
+                background: {
+                    wait: "Waiting for your hand.",
+                    two: "Two hands, or a face like one. Show one hand alone.",
+                    faint: "Your hand looks like what is behind it. Hold it before another colour.",
+                    busy: "Not plain, but your hand is found.",
+                    good: "Plain. Your hand stands out.",
+                },
+                still: {
+                    wait: "Waiting for your hand.",
+                    moving: "Hold your hand still.",
+                    good: "Your hand rests.",
+                },
+            },
+        },
+
+        teach: {
+            title: (name, number, all) => `${number} of ${all}: “${name}”`,
+            all: "All gestures",
+            tile: (name, status) => `${name}: ${status}`,
+            statuses: { now: "now", open: "to be taught", taught: "taught", skipped: "skipped" },
+            phases: {
+                change: "Now this one: change your hand.",
+                show: "Show this, the palm to the camera, and hold still.",
+                hold: "Hold still…",
+                taken: "Looking…",
+            },
+            looking: "Looking…",
+            saving: "Saving…",
+            stops: "This one really stops the robot; a reset makes it ready again. Show it, and hold still.",
+            stopsOther: (name) => `Take care: ${name} drives now, and this one stops the arm.`,
+            taught: (name, near) =>
+                near ? `“${name}” is taught. It is not far from “${near}”.` : `“${name}” is taught.`,
+            kept: (name) => `“${name}” is kept as it is.`,
+            skipped: (name) => `“${name}” is skipped; it stays as it was.`,
+            notSaved: (name, why) => `“${name}” was not saved: ${why} Show it again.`,
+            like: (name) => `This looks like “${name}”.`,
+            weak: (why, more) => [sentence(why), sentence(more), "Lower your hand, then show it again."]
+                .filter(Boolean)
+                .join(" "),
+            problems: {
+                no_hand: "No hand was found in the pictures.",
+                cut_off: "Your hand runs out of the picture.",
+                too_small: "Your hand is too far away.",
+                two_hands: "There are two hands in the picture, or something like one.",
+                no_wrist: "Your wrist is not seen. Hold your hand higher, sleeves pulled back.",
+                blurred: "The pictures are blurred. Hold still, and give more light.",
+                no_picture: "The camera gave no picture.",
+                other: "The pictures cannot be used.",
+            },
+            keep: "Keep it as it is",
+            back: "Back (B)",
+            redo: "Redo (R)",
+            skip: "Skip (S)",
+            over: (taught, skipped) =>
+                skipped
+                    ? `${plural(taught, "gesture is", "gestures are")} taught, ${skipped} skipped.`
+                    : `All ${taught} gestures are taught.`,
+        },
+
+        drive: {
+            list: {
+                control: "Take control",
+                arm: "Arm",
+                show: "Move the arm by two gestures",
+                stop: "Stop it",
+                reset: "Reset",
+            },
+            tasks: {
+                wait: () => "Waiting for the robot.",
+                ask: (name) => `${name} drives now. Ask for control below.`,
+                control: () => "Press “Take control” below.",
+                arm: () => "Press “Arm” below. Lower your hand first.",
+                stop: () => "Now stop it: press STOP below, or the space bar.",
+                reset: () => "The robot is stopped. Press “Reset” below: that moves nothing.",
+                done: () => "That is all. Take control, arm, and drive.",
+            },
+            why: {
+                control: "Only one person drives at a time.",
+                arm: "From then on your gestures move the robot.",
+                stop: "It works at any time, whoever drives.",
+                reset: "After a stop nothing moves until somebody resets and arms.",
+            },
+            show: (name, moved) =>
+                moved
+                    ? `Very good. Now show “${name}”, and hold it.`
+                    : `Show “${name}”, and hold it: the arm moves while you do.`,
+            watch: "The drawn hand shows its gestures. Watch the arm move.",
+            showWhy: "Lower your hand, and it stands still.",
+            finish: "Drive",
+        },
     },
 
     readout: {

@@ -91,7 +91,8 @@ export function sourceChoices(element, prefix) {
     ];
 }
 
-function sourceProblem(element, code) {
+/** Why there is no picture, and what to do about it. */
+export function sourceProblem(element, code) {
     const { title, words: text } = texts.sourceErrors[code] || texts.sourceErrors.failed;
     return [
         el(

@@ -62,8 +62,8 @@ export class Sheets {
     }
 }
 
-/** Contents of the help sheet; `check` is called by its button. */
-export function helpContent(check) {
+/** Contents of the help sheet; `first` and `check` are called by its buttons. */
+export function helpContent(first, check) {
     const { how, keysTitle, keys, keysNote, safetyTitle, safety } = texts.help;
     return [
         el("ol", { class: "how" }, ...how.map((text) => el("li", { text }))),
@@ -76,7 +76,12 @@ export function helpContent(check) {
             ),
         ),
         el("p", { class: "quiet", text: keysNote }),
-        button(texts.preflight.open, { id: "preflight-open", onclick: check }),
+        el(
+            "div",
+            { class: "row" },
+            button(texts.first.begin, { id: "help-first", onclick: first }),
+            button(texts.preflight.open, { id: "preflight-open", onclick: check }),
+        ),
         el("h3", { text: safetyTitle }),
         el("p", { text: safety }),
     ];

@@ -120,6 +120,9 @@ export function describeAction(action, description = null) {
     return action && action.duration && action.type !== "wait" ? words.lasting(what, short(action.duration)) : what;
 }
 
+/** Name of a gallery: the shared one has none of its own. */
+export const nameOf = (gallery) => (gallery.shared ? texts.first.whose.shared : gallery.name);
+
 /** An error of the REST interface as one sentence. */
 export function describeError(error) {
     if (error.status === 0) return texts.errors.unreachable;

@@ -1,0 +1,24 @@
+// How a gesture is held: the drawing of a starter gesture, else the gesture's own template.
+
+import { texts } from "../../texts/en.js";
+import { el } from "../dom.js";
+
+const { signs } = texts.first;
+
+/** How to hold the hand, in words; "" for a gesture that somebody made up. */
+export const signOf = (gesture) => signs[gesture.name] || "";
+
+/** A picture to imitate, mirrored as the webcam's is. */
+export function drawing(gesture, templateUrl) {
+    const known = Object.hasOwn(signs, gesture.name);
+    return el("img", {
+        class: known ? "first-drawing" : "first-drawing is-template",
+        src: known
+            ? `static/media/hands/${gesture.name}.webp`
+            : templateUrl(gesture.id, String(gesture.updated)),
+        alt: texts.first.drawingOf(gesture.name),
+        width: 168,
+        height: 196,
+        draggable: "false",
+    });
+}
