@@ -175,6 +175,8 @@ def test_where_somebody_stands_follows_from_what_was_done(modules: Page) -> None
     assert step(modules, checked=True, gallery="shared", galleries=None) == "teach"
     drawn = {"state": "running", "kind": "synthetic"}
     assert step(modules, source=drawn, asked=False) == "drive", "the drawn hand is nobody's"
+    keys = {"state": "running", "kind": "keys"}
+    assert step(modules, source=keys, asked=False) == "done", "who drives by keys shows no hand"
 
 
 def test_a_returning_person_is_known_by_this_browser_or_by_their_gallery(modules: Page) -> None:
