@@ -252,8 +252,11 @@ class GestureDriver:
 
     def _blocked(self) -> bool:
         """Something keeps the tool from going on: it did what was shown, and came nowhere."""
-        last = self.showings[-1]
-        return last.moved is not None and abs(last.way) < STILL_M
+        # Once may be a sign that was taken for another, such as the gripper's.
+        last = self.showings[-2:]
+        return len({showing.gesture for showing in last}) == 1 < len(last) and all(
+            showing.moved is not None and abs(showing.way) < STILL_M for showing in last
+        )
 
 
 def _tool(state: State) -> F64:
