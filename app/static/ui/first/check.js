@@ -107,7 +107,7 @@ export function checkStep({ store, video, sign, templateUrl, left, toLeft, go })
             say,
             el("div", { class: "row end" }, hand, on),
         ],
-        focus: on,
+        focus: null, // on a phone the button is below the picture
         close: () => clearInterval(timer),
     };
 }

@@ -9,7 +9,7 @@ import { driveTask, learn, movedBy, suggested } from "./plan.js";
 
 const words = texts.first.drive;
 const TICK_MS = 100;
-const SEEN_MS = 700; // a shorter motion is not noticed
+const SEEN_MS = 450; // a shorter motion is not noticed
 const LIST = ["control", "arm", "show", "stop", "reset"];
 const POINTS_AT = { reset: "btn-reset", ask: "btn-control", control: "btn-control", arm: "btn-arm", stop: "stop" };
 
@@ -28,10 +28,11 @@ function doneOf(task, state, progress) {
 
 /**
  * Contents of the step.
+ * @param note {string} what came of the step before, or ""
  * @param progress {function(): object} what was learnt so far; `keep(progress)` remembers more
  * @param done {function()} called by the last button
  */
-export function driveStep({ store, templateUrl, progress, keep, done }) {
+export function driveStep({ store, templateUrl, note, progress, keep, done }) {
     const say = el("p", { class: "first-say", role: "status" });
     const why = el("p", { class: "quiet" });
     const model = el("div", { class: "first-model" });
@@ -101,7 +102,14 @@ export function driveStep({ store, templateUrl, progress, keep, done }) {
     const timer = setInterval(tick, TICK_MS);
     tick();
     return {
-        content: [el("ol", { class: "first-tasks" }, ...items), say, why, model, el("div", { class: "row end" }, last)],
+        content: [
+            note ? el("p", { class: "first-note", data: { kind: "good" }, text: note }) : null,
+            el("ol", { class: "first-tasks" }, ...items),
+            say,
+            why,
+            model,
+            el("div", { class: "row end" }, last),
+        ].filter(Boolean),
         focus: null,
         close() {
             clearInterval(timer);

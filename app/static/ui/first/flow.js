@@ -36,6 +36,7 @@ async function styled() {
  */
 export class FirstMinutes {
     #disarmedAt = -Infinity;
+    #note = ""; // what came of the teaching
 
     constructor({ host, store, video, sheets, progress, act, templateUrl, told }) {
         Object.assign(this, { host, store, video, sheets, progress, act, templateUrl, told });
@@ -43,6 +44,7 @@ export class FirstMinutes {
 
     /** Go on where somebody stands. */
     async open() {
+        this.#note = "";
         await styled();
         this.#next();
     }
@@ -156,7 +158,7 @@ export class FirstMinutes {
                         if (!past.includes(id)) this.#learn({ past: [...past, id] });
                     },
                     done: (round) => {
-                        this.told(words.teach.over(round.count("taught"), round.count("skipped")));
+                        this.#note = words.teach.over(round.count("taught"), round.count("skipped"));
                         this.#next();
                     },
                 });
@@ -164,6 +166,7 @@ export class FirstMinutes {
                 return driveStep({
                     store,
                     templateUrl,
+                    note: this.#note,
                     progress: () => this.progress.get(),
                     keep: (progress) => this.progress.set(progress),
                     done: () => {
