@@ -5,28 +5,33 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from pydantic import ValidationError
 
-from app.config import Settings
 from app.errors import CannotStart, FarhandError, ImageRefused, Invalid, NotFound
-from app.gestures import GestureStore
-from app.link.actions import ACTION
 
 if TYPE_CHECKING:
+    from app.config import Settings
+    from app.gestures import GestureStore
     from app.gestures.backup import Place
     from app.pipeline.types import U8
 
 gestures_app = typer.Typer(help="The gesture database.", no_args_is_help=True)
 
 DataDir = Annotated[Path | None, typer.Option(help="Folder that holds the database.")]
+InGallery = Annotated[
+    str, typer.Option("--gallery", metavar="NAME", help="Whose gestures: the gallery's name.")
+]
+SHARED_NAME = "shared"
+"""Finds the shared gallery, whatever it is called now: it is the id."""
 
 
-def settings_for(**given: Any) -> Settings:
+def settings_for(**given: Any) -> "Settings":
     """Settings from the environment, overridden by every option that was given (is not None)."""
+    from app.config import Settings
+
     return Settings(**{name: value for name, value in given.items() if value is not None})
 
 
-def open_store(settings: Settings) -> GestureStore:
+def open_store(settings: "Settings") -> "GestureStore":
     """Open the database of ``settings``; a new one is filled with the starter set.
 
     Raises:
@@ -42,11 +47,14 @@ def open_store(settings: Settings) -> GestureStore:
 def list_gestures(
     data_dir: DataDir = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    gallery: InGallery = SHARED_NAME,
 ) -> None:
     """List the enrolled gestures and their actions."""
+    from app.link.actions import ACTION
+
     store = open_store(settings_for(data_dir=data_dir))
     try:
-        gestures = store.list()
+        gestures = store.list(store.galleries.named(gallery).id)
     finally:
         store.close()
     if as_json:
@@ -73,14 +81,15 @@ def list_gestures(
 def export(
     folder: Annotated[Path, typer.Argument(help="New folder, or a .zip file.")],
     data_dir: DataDir = None,
+    gallery: InGallery = SHARED_NAME,
 ) -> None:
-    """Write all gestures in the open exchange format."""
+    """Write all gestures of a gallery in the open exchange format."""
     from app.gestures.exchange import export_set
 
     store = open_store(settings_for(data_dir=data_dir))
     try:
-        export_set(store, folder)
-        print(f"{len(store.list())} gestures written to {folder}")
+        count = export_set(store, folder, store.galleries.named(gallery).id)
+        print(f"{count} gestures written to {folder}")
     finally:
         store.close()
 
@@ -90,14 +99,16 @@ def import_(
     folder: Annotated[Path, typer.Argument(help="Folder or .zip in the exchange format.")],
     data_dir: DataDir = None,
     replace: Annotated[bool, typer.Option(help="Overwrite gestures of the same name.")] = False,
+    gallery: InGallery = SHARED_NAME,
 ) -> None:
     """Read gestures in the exchange format: all of them, or none."""
     from app.gestures.exchange import import_set
 
     store = open_store(settings_for(data_dir=data_dir))
     try:
-        import_set(store, folder, replace=replace)
-        print(f"imported; the database now holds {len(store.list())} gestures")
+        into = store.galleries.named(gallery)
+        import_set(store, folder, replace=replace, gallery=into.id)
+        print(f"imported; {into.name} now holds {len(store.list(into.id))} gestures")
     finally:
         store.close()
 
@@ -238,11 +249,15 @@ def enrol(
     inactive: Annotated[
         bool, typer.Option("--inactive", help="Enrol it, but do not match it yet.")
     ] = False,
+    gallery: InGallery = SHARED_NAME,
 ) -> None:
     """Enrol a gesture from one or more photos, and say what it may be confused with."""
+    from pydantic import ValidationError
+
     from app.gateway.enrolment import confusions_json
     from app.gateway.gallery import build_matcher
     from app.gestures.records import clean_name
+    from app.link.actions import ACTION
     from app.pipeline import pack_template
 
     try:
@@ -255,9 +270,11 @@ def enrol(
     templates = [pack_template(template) for template in _templates(images, settings, burst)]
     store = open_store(settings)
     try:
-        threshold = build_matcher(store, settings.pipeline).max_distance
-        confusions = confusions_json(store.list(), settings.pipeline, threshold, name, templates)
-        gesture = store.create(name, parsed, templates, active=not inactive)
+        into = store.galleries.named(gallery).id
+        threshold = build_matcher(store, settings.pipeline, into).max_distance
+        others = store.list(into)
+        confusions = confusions_json(others, settings.pipeline, threshold, name, templates)
+        gesture = store.create(name, parsed, templates, active=not inactive, gallery=into)
     finally:
         store.close()
     print(f"enrolled {gesture.name!r} with {len(templates)} samples{', inactive' * inactive}")
@@ -267,7 +284,7 @@ def enrol(
             print(f"  {advice['message']}")
 
 
-def _templates(images: list[Path], settings: Settings, burst: bool) -> "list[U8]":
+def _templates(images: list[Path], settings: "Settings", burst: bool) -> "list[U8]":
     """The templates of photos that are good enough; prints what could be better.
 
     Raises:

@@ -4,15 +4,17 @@ import datetime
 import json
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from app.cli_gestures import settings_for
-from app.config import Settings
 from app.errors import CannotStart, Invalid
-from app.gateway.roles import Role
-from app.gateway.tokens import Token, TokenStore
+
+if TYPE_CHECKING:
+    from app.config import Settings
+    from app.gateway.roles import Role
+    from app.gateway.tokens import Token, TokenStore
 
 tokens_app = typer.Typer(
     help="Who may come in: make, list and revoke tokens.", no_args_is_help=True
@@ -23,8 +25,10 @@ DataDir = Annotated[Path | None, typer.Option(help="Folder that holds the tokens
 _UNITS = {"m": 60, "h": 3600, "d": 86400}
 
 
-def _store(settings: Settings) -> TokenStore:
+def _store(settings: "Settings") -> "TokenStore":
     """The file alone: a token from the environment is not of these commands' making."""
+    from app.gateway.tokens import TokenStore
+
     return TokenStore.from_settings(settings.model_copy(update={"token": None}))
 
 
@@ -116,7 +120,7 @@ def trust(data_dir: DataDir = None) -> None:
     print(found.pem.decode(), end="")
 
 
-def _ends(token: Token) -> str:
+def _ends(token: "Token") -> str:
     if token.expires is None:
         return "does not expire"
     day = token.expires.astimezone().strftime("%Y-%m-%d %H:%M")
@@ -124,5 +128,5 @@ def _ends(token: Token) -> str:
     return f"{'expired' if over else 'expires'} {day}"
 
 
-def _row(token: Token) -> dict[str, object]:
+def _row(token: "Token") -> dict[str, object]:
     return token.model_dump(mode="json", include={"id", "role", "name", "created", "expires"})

@@ -35,7 +35,7 @@ MAX_MIB = 50.0
 TEXTS: tuple[dict[str, object], ...] = (
     {"type": "take_control", "takeover": True},
     {"type": "hand_over", "to": "operator-1a2b3c"},
-    {"type": "view", "detail": True},
+    {"type": "view", "detail": True, "glass": True},
     {"type": "speed", "scale": 0.5},
     {"type": "picture", "camera": "wrist", "tick": 12345},
     {"type": "ping", "t": 12.5},

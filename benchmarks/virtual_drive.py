@@ -69,7 +69,7 @@ class VirtualWorld:
         self.eyes = Eyes(clock)
         self._lag_s = lag_s
         self._pipeline = Pipeline(settings, PcaMatcher.fit(starter_gallery(99), settings.match))
-        self._driver = Driver(_OPERATOR, Counter())
+        self._driver = Driver(_OPERATOR, Counter(), Counter())
         self._arm = SimulatedArm()
         self._robot = Controller(
             self._arm, "puma", motion or ArmMotionSettings(), StopLatch(None), self.time

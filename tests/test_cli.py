@@ -15,7 +15,7 @@ import pytest
 
 from app.gateway.machine import machine_names
 from app.gateway.tls import LocalAuthority
-from app.gestures import backup
+from app.gestures import GestureStore, backup
 from app.gestures.backup import Place
 from app.gestures.hand import POSES, HandLook, HandView, render_hand, render_sprite
 from app.gestures.hand.render import compose
@@ -64,6 +64,32 @@ def test_gestures_are_enrolled_listed_exported_and_imported(tmp_path: Path, phot
     farhand("gestures", "import", str(tmp_path / "set"), "--replace", "--data-dir", other)
     again = json.loads(farhand("gestures", "list", "--json", "--data-dir", other).stdout)
     assert {row["name"] for row in again} == {row["name"] for row in rows}
+
+
+def test_each_of_several_people_has_gestures_of_their_own(tmp_path: Path, photo: Path) -> None:
+    data = ("--data-dir", str(tmp_path / "data"))
+    told = farhand("gestures", "list", "--gallery", "Ann", *data, fails=True).stderr
+    assert "there is no gallery 'Ann'; there are: Shared" in told
+    store = GestureStore(f"sqlite:///{tmp_path / 'data' / 'gestures.db'}", None)
+    store.galleries.create("Ann")
+    store.galleries.create("Bob")
+    store.close()
+    home, folder = ("--action", '{"type":"home"}'), str(tmp_path / "set")
+    said = farhand("enroll", "wave", str(photo), *home, "--gallery", "ann", *data).stdout
+    assert "likely to be taken for 'home'" in said
+    assert "11 gestures" in farhand("gestures", "export", folder, "--gallery", "Ann", *data).stdout
+    into = ("--replace", "--gallery", "Bob")
+    assert "Bob now holds 11" in farhand("gestures", "import", folder, *into, *data).stdout
+    assert "wave" in farhand("gestures", "list", "--gallery", "BOB", *data).stdout
+    assert "wave" not in farhand("gestures", "list", *data).stdout
+
+
+def test_the_start_waits_for_no_part_that_a_command_may_not_need() -> None:
+    code = "import sys, app.cli; print(*sorted({name.split('.')[0] for name in sys.modules}))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
+    heavy = {"sqlalchemy", "alembic", "numpy", "cv2", "fastapi", "starlette", "pybullet", "zenoh"}
+    assert heavy.isdisjoint(done.stdout.split()), done.stdout + done.stderr
+    assert "typer" in done.stdout
 
 
 def test_what_is_wrong_is_told_in_one_line(tmp_path: Path, photo: Path) -> None:

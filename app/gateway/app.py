@@ -16,6 +16,7 @@ from app.errors import CannotStart, NotSignedIn
 from app.gateway import (
     cameras,
     rest_dry_run,
+    rest_galleries,
     rest_gestures,
     rest_programs,
     rest_robots,
@@ -147,6 +148,7 @@ def create_app(
         pages,
         trust.router,
         rest_gestures.router,
+        rest_galleries.router,
         rest_programs.router,
         rest_robots.router,
         rest_dry_run.router,

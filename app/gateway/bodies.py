@@ -2,6 +2,7 @@
 
 from typing import Any
 
+_GALLERY = {"type": "string", "default": "shared", "description": "id of a gallery"}
 _BURST = {"type": "boolean", "default": False, "description": "frames of a few seconds"}
 _IMAGES = {"type": "array", "items": {"type": "string", "format": "binary"}}
 ENROL_BODY: dict[str, Any] = {
@@ -15,6 +16,7 @@ ENROL_BODY: dict[str, Any] = {
                     "name": {"type": "string"},
                     "action": {"type": "string", "description": "an action as JSON"},
                     "active": {"type": "boolean", "default": True},
+                    "gallery": _GALLERY,
                     "burst": _BURST,
                     "images": _IMAGES,
                 },
@@ -46,6 +48,7 @@ CHECK_BODY: dict[str, Any] = {
                     "action": {"type": "string", "description": "an action as JSON"},
                     "active": {"type": "boolean", "default": True},
                     "gesture": {"type": "string", "description": "id, to check more samples of it"},
+                    "gallery": _GALLERY,
                     "burst": _BURST,
                     "images": _IMAGES,
                 },
@@ -60,7 +63,10 @@ IMAGE_BODY: dict[str, Any] = {
             "schema": {
                 "type": "object",
                 "required": ["image"],
-                "properties": {"image": {"type": "string", "format": "binary"}},
+                "properties": {
+                    "image": {"type": "string", "format": "binary"},
+                    "gallery": _GALLERY,
+                },
             }
         },
         "image/*": {"schema": {"type": "string", "format": "binary"}},
@@ -78,6 +84,19 @@ PATCH_BODY: dict[str, Any] = {
                     "active": {"type": "boolean"},
                     "version": {"type": "integer", "description": "the newest one known"},
                 },
+                "additionalProperties": False,
+            }
+        }
+    },
+}
+GALLERY_BODY: dict[str, Any] = {
+    "required": True,
+    "content": {
+        "application/json": {
+            "schema": {
+                "type": "object",
+                "required": ["name"],
+                "properties": {"name": {"type": "string"}},
                 "additionalProperties": False,
             }
         }

@@ -1,4 +1,7 @@
-"""From what the hand shows to what the robot is asked: one decision a processed frame."""
+"""From what the hand shows to what the robot is asked: one decision a processed frame.
+
+:mod:`app.gateway.held_keys` does the same for keys.
+"""
 
 from dataclasses import dataclass
 
@@ -20,6 +23,7 @@ DOUBTS: dict[Cause, Doubt] = {
 """What the node is told about a frame that shows no gesture. A hand that moves is no doubt: it may
 be on its way to the next gesture."""
 FROZEN = "the webcam picture is frozen"
+BY_KEYS = "you drive by keys: gestures move nothing meanwhile"
 _AGAIN = "show no gesture for half a second, then a new one"
 _TOO_EARLY = "this gesture began before the robot was ready: let go and show it again"
 _REPEATED = f"this was done already: {_AGAIN}"
@@ -49,6 +53,8 @@ class Situation:
     """Part of the ordinary speed that is wanted."""
     at: float = 0.0
     """When the frame arrived, s, monotonic."""
+    by_keys: bool = False
+    """The session drives by keys: its gestures move nothing, but may stop."""
 
 
 @dataclass(frozen=True)
@@ -77,12 +83,13 @@ class Driver:
     Args:
         session: Name of the session, for the log of stops.
         holds: Numbers of showings; shared by all sessions, so that none comes twice.
+        sequence: Numbers of commands; shared by all that commands for this session.
     """
 
-    def __init__(self, session: str, holds: Counter) -> None:
+    def __init__(self, session: str, holds: Counter, sequence: Counter) -> None:
         self._session = session
         self._holds = holds
-        self._sequence = 0
+        self._sequence = sequence
         self._gesture: str | None = None
         self._last: str | None = None
         self._hold = 0
@@ -96,10 +103,16 @@ class Driver:
         """The gesture is over: frames stopped coming."""
         self._gesture = None
 
-    def gestures_changed(self) -> None:
-        """A hand that is up may now show another gesture than before."""
+    def gestures_changed(self, *, all_of_them: bool = False) -> None:
+        """A hand that is up may now show another gesture than before.
+
+        Args:
+            all_of_them: These are another person's: what is held now ends, too.
+        """
         self._changed = True
         self._none_since = None
+        if all_of_them and self._gesture is not None:
+            self._barred = _CHANGED
 
     def decide(
         self,
@@ -125,7 +138,7 @@ class Driver:
         action = None if gesture is None else situation.actions.get(gesture)
         rested = self._rested(gesture, situation.at)
         self._changed = self._changed and not rested
-        reason = self._obstacle(situation) or blind
+        reason = obstacle(situation) or blind
         if begins:
             self._begin(gesture, action, rested=rested, ready=reason is None)
         elif reason is not None and not situation.stale:
@@ -150,12 +163,16 @@ class Driver:
             doubt = None if cause is None else DOUBTS.get(cause)
         elif action is None and blind is not None:
             doubt = "frozen" if frozen else "stale_picture"
-        if situation.stale or situation.lease is None or situation.state is None:
+        if (
+            situation.stale
+            or situation.lease is None
+            or situation.state is None
+            or situation.by_keys
+        ):
             return Decision(stop=stop, reason=reason if gesture else situation.stale)
-        self._sequence += 1
         command = Command(
             epoch=situation.lease.epoch,
-            sequence=self._sequence,
+            sequence=self._sequence.next(),
             tick=situation.state.tick,
             frame=frame,
             hold=self._hold,
@@ -194,26 +211,29 @@ class Driver:
             self._none_since = now
         return since is not None and now - since >= REST_S
 
-    def _obstacle(self, situation: Situation) -> str | None:
-        """Why no gesture could move the robot now, if so."""
-        state = situation.state
-        if situation.stale:
-            return situation.stale
-        if state is None:
-            return "the robot is not connected"
-        if situation.lease is None:
-            if state.controller is None:
-                return "nobody has control: take control first"
-            return f"you do not have control: {state.controller} drives"
-        match state.mode:
-            case "faulted":
-                return f"the robot has a fault: {state.fault or 'see its log'}"
-            case "stopped":
-                return "the robot is stopped: reset it, then arm it"
-            case "disarmed":
-                return "the robot is not armed"
-            case "holding":
-                reason = state.reason or "it was stopped gently"
-                how = "" if "show no gesture" in reason else f": {_AGAIN}"
-                return f"the robot holds still: {reason}{how}"
-        return None if state.armed else "the robot is not armed"
+
+def obstacle(situation: Situation) -> str | None:
+    """Why nothing that the session asks for could move the robot now, in plain words, if so."""
+    state = situation.state
+    if situation.stale:
+        return situation.stale
+    if situation.by_keys:
+        return BY_KEYS
+    if state is None:
+        return "the robot is not connected"
+    if situation.lease is None:
+        if state.controller is None:
+            return "nobody has control: take control first"
+        return f"you do not have control: {state.controller} drives"
+    match state.mode:
+        case "faulted":
+            return f"the robot has a fault: {state.fault or 'see its log'}"
+        case "stopped":
+            return "the robot is stopped: reset it, then arm it"
+        case "disarmed":
+            return "the robot is not armed"
+        case "holding":
+            reason = state.reason or "it was stopped gently"
+            how = "" if "show no gesture" in reason else f": {_AGAIN}"
+            return f"the robot holds still: {reason}{how}"
+    return None if state.armed else "the robot is not armed"

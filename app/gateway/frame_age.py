@@ -1,4 +1,4 @@
-"""How old a frame is when it arrives, without comparing clocks of two machines."""
+"""How old a frame, or a sign of a held key, is when it arrives, without comparing clocks."""
 
 
 class FrameAge:
@@ -11,10 +11,12 @@ class FrameAge:
 
     Args:
         limit_ms: Oldest age that may still move the robot.
+        what: What is judged, for the reasons given.
     """
 
-    def __init__(self, limit_ms: int) -> None:
+    def __init__(self, limit_ms: int, what: str = "frame") -> None:
         self._limit = limit_ms
+        self._what = what
         self._captured = -1.0
         self._least_offset = float("inf")
 
@@ -30,7 +32,7 @@ class FrameAge:
         self._captured = max(self._captured, captured_ms)
         self._least_offset = min(self._least_offset, now_ms - captured_ms)
         if seen_tick > now_ms:
-            return "the frame names a server tick that has not come yet"
+            return f"the {self._what} names a server tick that has not come yet"
         if seen_tick:
             age = now_ms - seen_tick
             how = f"its sender had seen nothing newer than {age} ms ago"
@@ -39,11 +41,12 @@ class FrameAge:
             how = f"it came {age} ms later than others did"
         else:
             return (
-                "the frame's age is not known, so it cannot move the robot: give the newest server "
-                "tick, or at least a capture time that rises"
+                f"the {self._what}'s age is not known, so it cannot move the robot: give the "
+                "newest server tick, or at least a capture time that rises"
             )
         if age <= self._limit:
             return None
         return (
-            f"the frame is too old to move the robot: {how}, at most {self._limit} ms are allowed"
+            f"the {self._what} is too old to move the robot: {how}, at most {self._limit} ms are "
+            "allowed"
         )

@@ -1,24 +1,17 @@
 """The work on one frame, done in a thread: recognise, decide, command, describe."""
 
-import base64
 import time
 from dataclasses import dataclass
 from typing import Any
 
-import cv2
-import numpy as np
-from numpy.typing import NDArray
-
 from app.config import Settings
+from app.gateway.detail import detail, glass
 from app.gateway.drive import Decision, Driver, Situation
 from app.gateway.eyes import FrozenCamera
 from app.gateway.gallery import Enrolled
 from app.gateway.numbers import Counter, tick_ms
 from app.gateway.robot_port import RobotPort
-from app.pipeline import FrameResult, Pipeline
-
-DETAIL_WIDTH = 160
-"""Pixels of the masks in a detail view."""
+from app.pipeline import Pipeline
 
 
 @dataclass(frozen=True)
@@ -34,6 +27,8 @@ class FrameJob:
     situation: Situation
     enrolled: Enrolled
     detail: bool
+    glass: bool = False
+    """With ``detail``: what the glass box shows, too."""
 
 
 @dataclass(frozen=True)
@@ -55,12 +50,13 @@ class FrameWorker:
         enrolled: Enrolled,
         robot: RobotPort,
         holds: Counter,
+        sequence: Counter,
     ) -> None:
         self._settings = settings
         self._robot = robot
         self._pipeline = Pipeline(settings.pipeline, enrolled.matcher)
-        self._version = enrolled.version
-        self._driver = Driver(session, holds)
+        self._enrolled = enrolled
+        self._driver = Driver(session, holds, sequence)
         self._frozen = FrozenCamera(settings.gateway.frozen_ms)
 
     def run(self, job: FrameJob) -> FrameDone:
@@ -70,10 +66,11 @@ class FrameWorker:
             FrameRefused: the frame is not what it should be; nothing moves because of it.
         """
         began = time.monotonic()
-        if job.enrolled.version != self._version:
+        if job.enrolled is not self._enrolled:
+            another = job.enrolled.gallery != self._enrolled.gallery
             self._pipeline.matcher = job.enrolled.matcher
-            self._version = job.enrolled.version
-            self._driver.gestures_changed()
+            self._enrolled = job.enrolled
+            self._driver.gestures_changed(all_of_them=another)
         result = self._pipeline(job.jpeg, seq=job.seq, now=job.arrived)
         frozen = self._frozen(result.digest, job.arrived)
         decision = self._driver.decide(
@@ -90,8 +87,11 @@ class FrameWorker:
         frame["gesture"] = result.gesture
         frame["reason"] = decision.reason or result.reason
         frame["doubt"] = decision.doubt
+        # The command is on its way by now: looking on costs the robot no time.
         if job.detail:
-            frame["detail"] = self._detail(result, job.enrolled)
+            frame["detail"] = detail(result, job.enrolled)
+        if job.detail and job.glass:
+            frame["detail"]["glass"] = glass(result, job.enrolled, self._settings.pipeline)
         messages = [frame]
         if result.event is not None:
             event = result.event
@@ -107,29 +107,7 @@ class FrameWorker:
             self._driver.end()
         return gesture_message(event.gesture, event.phase, event.seq)
 
-    def _detail(self, result: FrameResult, enrolled: Enrolled) -> dict[str, Any]:
-        height, width = result.mask.shape
-        small = (DETAIL_WIDTH, max(1, round(DETAIL_WIDTH * height / width)))
-        mask = cv2.resize(result.mask, small, interpolation=cv2.INTER_AREA)
-        template = result.template
-        return {
-            "mask": bit_png(mask),
-            "template": None if template is None else bit_png(template),
-            "distances": {name: round(value, 4) for name, value in result.distances.items()},
-            "threshold": enrolled.matcher.max_distance,
-            "wrist": None if result.wrist is None else result.wrist._asdict(),
-        }
-
 
 def gesture_message(gesture: str, phase: str, seq: int) -> dict[str, Any]:
     """The ``gesture`` message."""
     return {"type": "gesture", "gesture": gesture, "phase": phase, "seq": seq}
-
-
-def bit_png(mask: NDArray[Any]) -> str:
-    """A mask of 0 and 1 as a one-bit PNG in base64; 1 is white."""
-    done, data = cv2.imencode(
-        ".png", np.where(mask, np.uint8(255), np.uint8(0)), [cv2.IMWRITE_PNG_BILEVEL, 1]
-    )
-    assert done
-    return base64.b64encode(data.tobytes()).decode("ascii")

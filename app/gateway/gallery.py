@@ -2,6 +2,7 @@
 
 import logging
 import threading
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,9 +12,10 @@ from sqlalchemy import make_url
 from sqlalchemy.exc import ArgumentError
 
 from app.config import PipelineSettings, Settings
-from app.errors import CannotStart
-from app.gestures import GestureStore
+from app.errors import CannotStart, NotFound
+from app.gestures import Gesture, GestureStore
 from app.gestures.backup import Place
+from app.gestures.records import SHARED
 from app.gestures.recovery import Hold, check_there, open_or_set_aside
 from app.link.actions import Action
 from app.pipeline import Gallery, PcaMatcher, unpack_template
@@ -23,6 +25,8 @@ log = logging.getLogger(__name__)
 
 DATABASE_FILE = "gestures.db"
 BACKUPS = "backups"
+SPARE = 4
+"""Galleries that stay fitted although no session uses them: who teaches asks again and again."""
 
 
 def starter_set() -> Path | None:
@@ -105,57 +109,131 @@ def fit(templates: Sequence[tuple[str, bytes]], settings: PipelineSettings) -> P
     return PcaMatcher.fit(gallery, settings.match)
 
 
-def build_matcher(store: GestureStore, settings: PipelineSettings) -> PcaMatcher:
-    """A matcher for everything that is enrolled now."""
-    return fit(store.templates(), settings)
+def build_matcher(
+    store: GestureStore, settings: PipelineSettings, gallery: str = SHARED
+) -> PcaMatcher:
+    """A matcher for everything that is enrolled in a gallery now."""
+    return fit(store.templates(gallery), settings)
 
 
 @dataclass(frozen=True)
 class Enrolled:
-    """What was enrolled at one moment. Immutable, so that sessions may share it."""
+    """What a gallery held at one moment. Immutable, so that sessions may share it."""
 
     version: int
+    """Of the whole database."""
     matcher: PcaMatcher
     actions: dict[str, Action] = field(default_factory=dict)
     """By the active gesture's name."""
+    gallery: str = SHARED
+    """The gallery's id."""
+    content: tuple[Gesture, ...] = ()
+    """The active gestures."""
+
+    @property
+    def ids(self) -> dict[str, str]:
+        """Ids of the active gestures, by name."""
+        return {gesture.name: gesture.id for gesture in self.content}
 
 
 class LiveGallery:
-    """Keeps :class:`Enrolled` up to date with the database. Safe to use from any thread."""
+    """Keeps :class:`Enrolled` of every gallery in use up to date with the database.
+
+    The shared one is always in use, another between :meth:`join` and :meth:`leave`; one that is
+    asked for without that is fitted then, and kept for a while. Safe to use from any thread, but
+    for these two, which belong to the event loop.
+    """
 
     def __init__(self, store: GestureStore, settings: PipelineSettings) -> None:
         self._store = store
         self._settings = settings
         self._lock = threading.Lock()
-        self._current = self._read()
+        self._users: Counter[str] = Counter((SHARED,))
+        self._version = store.version
+        self._fitted = {SHARED: self._read(SHARED)}
+
+    @property
+    def version(self) -> int:
+        """Of the database, as of the last :meth:`refresh`."""
+        return self._version
 
     @property
     def current(self) -> Enrolled:
-        """What is enrolled, as of the last :meth:`refresh`."""
-        return self._current
+        """What the shared gallery held then."""
+        return self._fitted[SHARED]
 
-    def refresh(self) -> bool:
-        """Read the database again if it changed, whichever process changed it.
+    @property
+    def fitted(self) -> int:
+        """How many galleries have a matcher."""
+        return len(self._fitted)
 
-        Returns:
-            Whether it had changed. Takes as long as fitting the matcher; not for the event loop.
+    def known(self, gallery: str) -> Enrolled | None:
+        """What a gallery held then, if it is in use and still there. Takes no time."""
+        return self._fitted.get(gallery)
+
+    def join(self, gallery: str) -> None:
+        """Begin to use a gallery: from now on :meth:`refresh` keeps it. See :meth:`of` for it."""
+        self._users[gallery] += 1
+
+    def leave(self, gallery: str) -> None:
+        """End what :meth:`join` began."""
+        self._users[gallery] -= 1
+
+    def of(self, gallery: str) -> Enrolled:
+        """What a gallery holds, as of the last :meth:`refresh` or now.
+
+        May take as long as fitting a matcher; not for the event loop.
+
+        Raises:
+            NotFound: no gallery has this id.
         """
         with self._lock:
-            if self._store.version == self._current.version:
+            found = self._fitted.get(gallery)
+            if found is None:
+                found = self._fitted[gallery] = self._read(gallery)
+                self._forget_unused()
+            return found
+
+    def refresh(self) -> bool:
+        """Read the galleries in use again if anything changed, whichever process changed it.
+
+        Returns:
+            Whether something had changed. Takes as long as fitting the matchers of those that did;
+            not for the event loop.
+        """
+        with self._lock:
+            # The version first: a change in between is then seen by the next refresh.
+            version = self._store.version
+            if version == self._version:
                 return False
-            self._current = self._read()
-            log.info("%d gestures are enrolled", len(self._current.actions))
+            there = {gallery.id for gallery in self._store.galleries.list()}
+            for id, before in tuple(self._fitted.items()):
+                if id not in there or self._users[id] <= 0:
+                    del self._fitted[id]
+                    continue
+                try:
+                    now = self._fitted[id] = self._read(id, before)
+                except NotFound:  # it went meanwhile
+                    del self._fitted[id]
+                    continue
+                if now is not before:
+                    log.info("%d gestures are enrolled in gallery %s", len(now.actions), id)
+            self._version = version
             return True
 
-    def _read(self) -> Enrolled:
-        # The version first: a change in between is then seen by the next refresh.
+    def _read(self, id: str, before: Enrolled | None = None) -> Enrolled:
+        """What a gallery holds; ``before``, where that is still the same."""
         version = self._store.version
-        gestures = self._store.list()
+        content = tuple(gesture for gesture in self._store.list(id) if gesture.active)
+        if before is not None and before.content == content:
+            return before
         pairs = [
-            (gesture.name, sample.template)
-            for gesture in gestures
-            if gesture.active
-            for sample in gesture.samples
+            (gesture.name, sample.template) for gesture in content for sample in gesture.samples
         ]
-        actions = {gesture.name: gesture.action for gesture in gestures if gesture.active}
-        return Enrolled(version, fit(pairs, self._settings), actions)
+        actions = {gesture.name: gesture.action for gesture in content}
+        return Enrolled(version, fit(pairs, self._settings), actions, id, content)
+
+    def _forget_unused(self) -> None:
+        unused = [id for id in self._fitted if self._users[id] <= 0]
+        for id in unused[:-SPARE]:
+            del self._fitted[id]

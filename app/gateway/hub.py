@@ -72,7 +72,7 @@ class Hub:
         """Held while a program is being checked."""
         self._link_threads = ThreadPoolExecutor(LINK_THREADS, "link")
         self._stop_threads = ThreadPoolExecutor(STOP_THREADS, "stop")
-        self._told_version = gallery.current.version
+        self._told_version = gallery.version
         self._told_problem = keeper.problem
 
     @classmethod
@@ -175,7 +175,7 @@ class Hub:
     async def gallery_changed(self) -> None:
         """Read the gestures again if they changed, and tell every session."""
         await asyncio.to_thread(self.gallery.refresh)
-        current = self.gallery.current.version
+        current = self.gallery.version
         if current != self._told_version:
             self._told_version = current
             self.keeper.changed()
@@ -207,13 +207,8 @@ class Hub:
             raise NotAllowed(self.keeper.problem, code="gestures_lost")
 
     def _tell_gallery(self) -> None:
-        message = {
-            "type": "gallery",
-            "version": self.gallery.current.version,
-            "problem": self.keeper.problem,
-        }
         for session in tuple(self.people.sessions):
-            session.outbox.put(message)
+            session.tell_gallery()
 
     def _live_values(self) -> Iterable[tuple[str, str, float | None]]:
         robot = self.robot
@@ -225,8 +220,13 @@ class Hub:
         yield "farhand_sessions", "Operator sessions open", float(len(self.people.sessions))
         yield (
             "farhand_gestures",
-            "Gestures enrolled",
+            "Gestures enrolled in the shared gallery",
             float(len(self.gallery.current.actions)),
+        )
+        yield (
+            "farhand_galleries_fitted",
+            "Galleries with a matcher: those in use, and a few that were lately",
+            float(self.gallery.fitted),
         )
         if state is not None:
             yield "farhand_node_stops", "Stops the node received", float(state.stops)

@@ -32,9 +32,8 @@ async def read_object(request: Request, allowed: tuple[str, ...]) -> dict[str, A
     found = parse_json(bytes(body), "body")
     if not isinstance(found, dict) or not found or found.keys() - set(allowed):
         *most, last = (f"'{name}'" for name in allowed)
-        raise Invalid(
-            f"send a JSON object with one or more of {', '.join(most)} and {last}", field="body"
-        )
+        which = f"one or more of {', '.join(most)} and {last}" if most else last
+        raise Invalid(f"send a JSON object with {which}", field="body")
     return found
 
 

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from app.errors import FarhandError, MessageRefused
 from app.gateway.errors import describe_validation
+from app.link.actions import HeldAction
 
 MAX_TEXT = 4096
 """Characters of a client's text message."""
@@ -29,9 +30,21 @@ CLIENT_MESSAGES = (
     "ask_control",
     "keep_control",
     "hand_over",
+    "jog",
+    "use_gallery",
 )
-SERVER_MESSAGES = ("hello", "frame", "gesture", "robot", "gallery", "people", "pong", "error")
-NEWEST_WINS = frozenset({"frame", "robot", "gallery", "people", "pong"})
+SERVER_MESSAGES = (
+    "hello",
+    "frame",
+    "gesture",
+    "robot",
+    "gallery",
+    "people",
+    "pong",
+    "jog",
+    "error",
+)
+NEWEST_WINS = frozenset({"frame", "robot", "gallery", "people", "pong", "jog"})
 
 
 class _ClientMessage(BaseModel):
@@ -60,11 +73,19 @@ class HandOver(_ClientMessage):
     to: str = Field(min_length=1, max_length=40, description="its name")
 
 
+class UseGallery(_ClientMessage):
+    """Recognise this session against another gallery; answered with ``gallery``."""
+
+    type: Literal["use_gallery"]
+    gallery: str = Field(min_length=1, max_length=64, description="its id")
+
+
 class View(_ClientMessage):
     """Ask for masks and templates in the ``frame`` messages, or for none."""
 
     type: Literal["view"]
     detail: bool
+    glass: bool = Field(default=False, description="with detail: every step between, too")
 
 
 class Speed(_ClientMessage):
@@ -82,6 +103,16 @@ class Picture(_ClientMessage):
     tick: int = Field(ge=0, description="of the state that the picture shows, ms")
 
 
+class Jog(_ClientMessage):
+    """What a key, a button or a gamepad asks for while it is held; sent over and over."""
+
+    type: Literal["jog"]
+    hold: int = Field(ge=0, lt=2**53, description="number of this press: rises with each")
+    action: HeldAction | None = Field(description="null: nothing is held, and the way is alive")
+    scale: float = Field(default=1.0, ge=0.05, le=1.0, description="part of the session's speed")
+    tick: int = Field(ge=1, description="newest server tick that the client has seen, ms")
+
+
 class Ping(_ClientMessage):
     """Answered with ``pong``."""
 
@@ -90,7 +121,8 @@ class Ping(_ClientMessage):
 
 
 ClientMessage = Annotated[
-    TakeControl | Plain | HandOver | View | Speed | Picture | Ping, Field(discriminator="type")
+    TakeControl | Plain | HandOver | UseGallery | View | Speed | Picture | Jog | Ping,
+    Field(discriminator="type"),
 ]
 _CLIENT_MESSAGE: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)
 

@@ -22,7 +22,7 @@ from app.gateway.gallery import Enrolled
 from app.gateway.json_bodies import parse_action, parse_json
 from app.gateway.uploads import read_enrolment, read_image
 from app.gestures import Gesture, template_png
-from app.gestures.records import clean_name
+from app.gestures.records import SHARED, clean_name
 from app.link.actions import ACTION
 from app.pipeline import extract_template
 
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from app.gateway.hub import Hub
 
 router = APIRouter(prefix="/api", tags=["gestures"])
+
+GalleryId = Annotated[str, Query(max_length=64, description="id of a gallery")]
 
 
 def gesture_json(gesture: Gesture) -> dict[str, Any]:
@@ -40,6 +42,8 @@ def gesture_json(gesture: Gesture) -> dict[str, Any]:
         "action": ACTION.dump_python(gesture.action, mode="json", exclude_none=True),
         "active": gesture.active,
         "version": gesture.version,
+        "gallery": gesture.gallery,
+        "taught": gesture.taught,
         "samples": len(gesture.samples),
         "sample_ids": [sample.id for sample in gesture.samples],
         "created": gesture.created.isoformat(),
@@ -53,10 +57,14 @@ def hub_of(request: Request) -> "Hub":
     return hub
 
 
-@router.get("/gestures", summary="All enrolled gestures")
-async def list_gestures(request: Request) -> list[dict[str, Any]]:
+@router.get(
+    "/gestures",
+    summary="All enrolled gestures of a gallery",
+    responses={404: {"description": "unknown gallery"}},
+)
+async def list_gestures(request: Request, gallery: GalleryId = SHARED) -> list[dict[str, Any]]:
     """All gestures, in the order in which they were enrolled."""
-    gestures = await asyncio.to_thread(hub_of(request).store.list)
+    gestures = await asyncio.to_thread(hub_of(request).store.list, gallery)
     return [gesture_json(gesture) for gesture in gestures]
 
 
@@ -67,6 +75,7 @@ async def list_gestures(request: Request) -> list[dict[str, Any]]:
     openapi_extra={"requestBody": ENROL_BODY},
     responses={
         **BAD_BODY,
+        404: {"description": "unknown gallery"},
         409: {"description": "the name is taken"},
         413: {"description": "too many bytes"},
         422: {"description": "a bad name or action, or an image without a hand"},
@@ -78,17 +87,20 @@ async def create_gesture(request: Request, response: Response) -> dict[str, Any]
     With ``burst`` the images are the frames of a few seconds, of which the best are kept.
     """
     hub = hub_of(request)
-    upload = await read_enrolment(request, hub.settings.gateway, {"name", "action", "active"})
+    known = {"name", "action", "active", "gallery"}
+    upload = await read_enrolment(request, hub.settings.gateway, known)
     for field in ("name", "action"):
         if field not in upload.fields:
             raise Invalid(f"the field {field!r} is missing", field=field)
     active = upload.flag("active", True)
     name = clean_name(upload.fields["name"])
     action = parse_action(parse_json(upload.fields["action"], "action"))
+    gallery = upload.gallery
+    await asyncio.to_thread(hub.store.galleries.get, gallery)
     judged = await judge_for_enrolment(hub, upload.images, burst=upload.burst)
-    confusions = await confusions_of(hub, name, judged.templates)
+    confusions = await confusions_of(hub, gallery, name, judged.templates)
     gesture = await asyncio.to_thread(
-        hub.store.create, name, action, judged.templates, active=active
+        hub.store.create, name, action, judged.templates, active=active, gallery=gallery
     )
     await hub.gallery_changed()
     response.headers["Location"] = f"/api/gestures/{gesture.id}"
@@ -96,12 +108,21 @@ async def create_gesture(request: Request, response: Response) -> dict[str, Any]
 
 
 async def confusions_of(
-    hub: "Hub", name: str, templates: list[bytes], besides: str | None = None
+    hub: "Hub", gallery: str, name: str, templates: list[bytes], besides: str | None = None
 ) -> list[dict[str, Any]]:
-    """What a gesture with these templates may be confused with; ``besides`` is its own id."""
-    gestures = await asyncio.to_thread(hub.store.list)
-    settings, threshold = hub.settings.pipeline, hub.gallery.current.matcher.max_distance
+    """What a gesture with these templates may be confused with; ``besides`` is its own id.
+
+    Raises:
+        NotFound: no gallery has this id.
+    """
+    gestures = await asyncio.to_thread(hub.store.list, gallery)
+    settings, threshold = hub.settings.pipeline, await _threshold(hub, gallery)
     return await run(hub, confusions_json, gestures, settings, threshold, name, templates, besides)
+
+
+async def _threshold(hub: "Hub", gallery: str) -> float:
+    """Largest distance at which a match is accepted."""
+    return (await asyncio.to_thread(hub.gallery.of, gallery)).matcher.max_distance
 
 
 def _enrolled_json(
@@ -117,7 +138,7 @@ def _enrolled_json(
     openapi_extra={"requestBody": CHECK_BODY},
     responses={
         **BAD_BODY,
-        404: {"description": "unknown id in 'gesture'"},
+        404: {"description": "unknown id in 'gesture' or 'gallery'"},
         413: {"description": "too many bytes"},
         422: {"description": "a bad name or action, or no image"},
     },
@@ -125,13 +146,15 @@ def _enrolled_json(
 async def check_gesture(request: Request) -> dict[str, Any]:
     """Judge images before they are enrolled: are they good, and what may be confused with them?"""
     hub = hub_of(request)
-    known = {"name", "action", "active", "gesture"}
+    known = {"name", "action", "active", "gesture", "gallery"}
     upload = await read_enrolment(request, hub.settings.gateway, known)
     upload.flag("active", True)
-    name, besides, samples = "the new gesture", None, []
+    name, besides, samples, gallery = "the new gesture", None, [], upload.gallery
     if "gesture" in upload.fields:
         gesture = await asyncio.to_thread(hub.store.get, upload.fields["gesture"])
-        name, besides = gesture.name, gesture.id
+        if "gallery" in upload.fields and gallery != gesture.gallery:
+            raise Invalid("'gesture' is not in 'gallery'; leave one of them out", field="gallery")
+        name, besides, gallery = gesture.name, gesture.id, gesture.gallery
         samples = [sample.template for sample in gesture.samples]
     if "name" in upload.fields:
         name = clean_name(upload.fields["name"])
@@ -140,28 +163,33 @@ async def check_gesture(request: Request) -> dict[str, Any]:
     judged = await judge(hub, upload.images, burst=upload.burst)
     confusions: list[dict[str, Any]] = []
     if judged.kept:
-        confusions = await confusions_of(hub, name, samples + judged.templates, besides)
+        confusions = await confusions_of(hub, gallery, name, samples + judged.templates, besides)
     return {
         "images": judged.images_json(),
         "accepted": len(judged.kept),
         "left_out": judged.left_out,
         "confusions": confusions,
-        "threshold": hub.gallery.current.matcher.max_distance,
+        "threshold": await _threshold(hub, gallery),
     }
 
 
-@router.get("/gestures/confusions", summary="Which gestures may be taken for one another")
-async def list_confusions(request: Request) -> dict[str, Any]:
+@router.get(
+    "/gestures/confusions",
+    summary="Which gestures of a gallery may be taken for one another",
+    responses={404: {"description": "unknown gallery"}},
+)
+async def list_confusions(request: Request, gallery: GalleryId = SHARED) -> dict[str, Any]:
     """All gestures against all others, active or not, and what would help."""
     hub = hub_of(request)
     version = await asyncio.to_thread(lambda: hub.store.version)
-    cached: tuple[int, dict[str, Any]] | None = getattr(request.app.state, "confusions", None)
-    if cached is not None and cached[0] == version:
-        return cached[1]
-    gestures = await asyncio.to_thread(hub.store.list)
-    threshold = hub.gallery.current.matcher.max_distance
-    answer = await run(hub, matrix_json, gestures, hub.settings.pipeline, threshold)
-    request.app.state.confusions = version, answer
+    cached: tuple[int, dict[str, Any]] = getattr(request.app.state, "confusions", (version, {}))
+    answers = cached[1] if cached[0] == version else {}
+    answer: dict[str, Any] | None = answers.get(gallery)
+    if answer is None:
+        gestures = await asyncio.to_thread(hub.store.list, gallery)
+        threshold = await _threshold(hub, gallery)
+        answer = await run(hub, matrix_json, gestures, hub.settings.pipeline, threshold)
+        request.app.state.confusions = version, {**answers, gallery: answer}
     return answer
 
 
@@ -197,15 +225,20 @@ async def delete_gesture(request: Request, id: str) -> Response:
         422: {"description": "an image without a hand"},
     },
 )
-async def add_samples(request: Request, id: str) -> dict[str, Any]:
+async def add_samples(
+    request: Request,
+    id: str,
+    replace: Annotated[bool, Query(description="in place of all samples so far")] = False,
+) -> dict[str, Any]:
     """Enrol more images of a gesture: all of them, or none; of a burst the best."""
     hub = hub_of(request)
     gesture = await asyncio.to_thread(hub.store.get, id)
     upload = await read_enrolment(request, hub.settings.gateway, set())
     judged = await judge_for_enrolment(hub, upload.images, burst=upload.burst)
-    templates = [*(sample.template for sample in gesture.samples), *judged.templates]
-    confusions = await confusions_of(hub, gesture.name, templates, id)
-    gesture = await asyncio.to_thread(hub.store.add_samples, id, judged.templates)
+    kept = [] if replace else [sample.template for sample in gesture.samples]
+    templates = kept + judged.templates
+    confusions = await confusions_of(hub, gesture.gallery, gesture.name, templates, id)
+    gesture = await asyncio.to_thread(hub.store.add_samples, id, judged.templates, replace=replace)
     await hub.gallery_changed()
     return _enrolled_json(gesture, judged, upload.burst, confusions)
 
@@ -259,6 +292,7 @@ def _recognise(image: bytes, settings: PipelineSettings, enrolled: Enrolled) -> 
     openapi_extra={"requestBody": IMAGE_BODY},
     responses={
         **BAD_BODY,
+        404: {"description": "unknown gallery"},
         413: {"description": "too many bytes"},
         422: {"description": "not an image"},
     },
@@ -266,10 +300,9 @@ def _recognise(image: bytes, settings: PipelineSettings, enrolled: Enrolled) -> 
 async def recognise(request: Request) -> dict[str, Any]:
     """An image in (multipart field ``image``, or the body itself), the match out."""
     hub = hub_of(request)
-    image = await read_image(request, hub.settings.gateway.max_upload_bytes)
+    upload = await read_image(request, hub.settings.gateway.max_upload_bytes)
+    (image,) = upload.images
     if not image:
         raise Invalid("the image is empty", field="image")
-    loop = asyncio.get_running_loop()
-    return await loop.run_in_executor(
-        hub.images, _recognise, image, hub.settings.pipeline, hub.gallery.current
-    )
+    enrolled = await asyncio.to_thread(hub.gallery.of, upload.gallery)
+    return await run(hub, _recognise, image, hub.settings.pipeline, enrolled)

@@ -66,7 +66,7 @@ async def update_gesture(request: Request, id: str) -> dict[str, Any]:
     if active is None:
         return gesture_json(gesture)
     templates = [sample.template for sample in gesture.samples]
-    confusions = await confusions_of(hub, gesture.name, templates, gesture.id)
+    confusions = await confusions_of(hub, gesture.gallery, gesture.name, templates, gesture.id)
     return {**gesture_json(gesture), "confusions": confusions}
 
 

@@ -43,6 +43,7 @@ def robot_message(robot: RobotPort) -> dict[str, Any]:
             },
             "base": None if state.base is None else [round(value, 6) for value in state.base],
             "seq": state.frame,
+            "seq_tick": state.began,
             "stop": state.stop,
             "stops": state.stops,
             "reason": state.reason,

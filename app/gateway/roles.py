@@ -41,6 +41,7 @@ ROUTES: dict[str, Access] = {
     "GET /api/gestures/{id}": "signed in",
     "GET /api/gestures/{id}/template.png": "signed in",
     "GET /api/gestures/{id}/versions": "signed in",
+    "GET /api/galleries": "signed in",
     "GET /api/robots": "signed in",
     "GET /api/robots/{id}": "signed in",
     "GET /api/cameras": "signed in",
@@ -62,6 +63,9 @@ ROUTES: dict[str, Access] = {
     "DELETE /api/gestures/{id}": "operator",
     "POST /api/gestures/{id}/samples": "operator",
     "POST /api/gestures/{id}/versions/{version}/restore": "operator",
+    "POST /api/galleries": "operator",
+    "PATCH /api/galleries/{id}": "operator",
+    "DELETE /api/galleries/{id}": "operator",
     "POST /api/robots/{id}/dry-run": "operator",
 }
 
@@ -80,6 +84,8 @@ MESSAGES: dict[str, Access] = {
     "ask_control": "operator",
     "keep_control": "operator",
     "hand_over": "operator",
+    "jog": "operator",
+    "use_gallery": "operator",
     "arm": "operator",
     "disarm": "operator",
     "reset": "operator",

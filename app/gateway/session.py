@@ -14,19 +14,24 @@ from app.gateway.errors import INTERNAL_MESSAGE
 from app.gateway.eyes import PictureAge
 from app.gateway.frame_age import FrameAge
 from app.gateway.frame_job import FrameDone, FrameJob, FrameWorker
+from app.gateway.gallery import Enrolled
+from app.gateway.gallery_choice import GalleryChoice
+from app.gateway.held_keys import HeldKeys
 from app.gateway.lease_keeper import LeaseKeeper
 from app.gateway.messages import (
     ClientMessage,
     HandOver,
+    Jog,
     Picture,
     Ping,
     Speed,
     TakeControl,
+    UseGallery,
     View,
     error_message,
     parse_client_message,
 )
-from app.gateway.numbers import newer, tick_ms
+from app.gateway.numbers import Counter, newer, tick_ms
 from app.gateway.outbox import Outbox
 from app.gateway.pace import Pace
 from app.gateway.roles import FRAME, OPERATORS_ONLY, Role, may_send
@@ -47,6 +52,9 @@ MAX_MESSAGES_HZ = 200.0
 take the time of all; a page sends less than half of it."""
 MESSAGE_BURST = 100
 IDLE_CHECK_S = 0.05
+KEYS_S = 0.5
+"""So long after its last ``jog`` message a session counts as driving by keys, and its frames move
+nothing: twice the life of a command."""
 CLOSE_BAD = 1007
 CLOSE_TOO_BIG = 1009
 CLOSE_TOO_SLOW = 1013
@@ -84,9 +92,15 @@ class OperatorSession:
         self._hub = hub
         self._socket = socket
         self._settings = hub.settings
+        sequence = Counter()
         self._worker = FrameWorker(
-            self.name, hub.settings, hub.gallery.current, hub.robot, hub.holds
+            self.name, hub.settings, hub.gallery.current, hub.robot, hub.holds, sequence
         )
+        self._keys = HeldKeys(hub.holds, sequence)
+        self._keys_at = float("-inf")
+        self._keys_age = FrameAge(hub.settings.gateway.max_frame_age_ms, "key press")
+        self._keys_told: tuple[int, str | None] | None = None
+        self._gallery = GalleryChoice(hub.gallery)
         self._heard_at = time.monotonic()
         self._leases = LeaseKeeper(self.name, hub.robot, hub.ask, self._silent_s, self.tell)
         self._requests: asyncio.Queue[ClientMessage] = asyncio.Queue(MAX_REQUESTS)
@@ -101,7 +115,7 @@ class OperatorSession:
         self._age = FrameAge(hub.settings.gateway.max_frame_age_ms)
         self._pictures = PictureAge(hub.settings.gateway.picture_age_ms)
         self._scale = 1.0
-        self._detail = False
+        self._detail = self._glass = False
         self._next_detail = 0.0
 
     async def run(self) -> None:
@@ -125,6 +139,7 @@ class OperatorSession:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
+            self._gallery.close()
             await asyncio.shield(self._leases.close())
 
     async def _end(self, task: asyncio.Task[None]) -> None:
@@ -160,7 +175,7 @@ class OperatorSession:
             "robot": self._hub.robot.id,
             "session": self.name,
             "version": self._hub.version,
-            "gallery": self._hub.gallery.current.version,
+            "gallery": self._hub.gallery.version,
             "problem": self._hub.keeper.problem,
             "limits": {
                 "frame_bytes": decode.max_bytes,
@@ -228,26 +243,49 @@ class OperatorSession:
         detail = self._detail and now >= self._next_detail
         if detail:
             self._next_detail = now + 1 / self._settings.gateway.detail_rate_hz
-        enrolled = self._hub.gallery.current
-        state = self._hub.robot.live_state
+        enrolled = self._gallery.enrolled
+        stale = self._age(header.tick, header.captured_ms, tick_ms())
+        by_keys = now - self._keys_at < KEYS_S
         self._slot = FrameJob(
             seq=seq,
             jpeg=jpeg,
             arrived=now,
             arrival=self._arrivals,
-            situation=Situation(
-                actions=enrolled.actions,
-                lease=self._leases.lease,
-                state=state,
-                stale=self._age(header.tick, header.captured_ms, tick_ms()),
-                unseen=None if state is None else self._pictures(state.tick),
-                scale=self._scale,
-                at=now,
-            ),
+            situation=self._situation(enrolled, now, stale, by_keys=by_keys),
             enrolled=enrolled,
             detail=detail,
+            glass=self._glass,
         )
         self._slot_filled.set()
+
+    def _situation(
+        self, enrolled: Enrolled, now: float, stale: str | None, *, by_keys: bool
+    ) -> Situation:
+        state = self._hub.robot.live_state
+        return Situation(
+            actions=enrolled.actions,
+            lease=self._leases.lease,
+            state=state,
+            stale=stale,
+            unseen=None if state is None else self._pictures(state.tick),
+            scale=self._scale,
+            at=now,
+            by_keys=by_keys,
+        )
+
+    def _take_jog(self, jog: Jog) -> None:
+        """Command what a held key asks for, and say when nothing comes of it, and why."""
+        now = self._keys_at = time.monotonic()
+        stale = self._keys_age(jog.tick, 0.0, tick_ms())
+        situation = self._situation(self._gallery.enrolled, now, stale, by_keys=False)
+        decision = self._keys.decide(jog, situation)
+        if decision.command is not None:
+            self._hub.robot.send(decision.command)
+            self._hub.metrics.commands.inc()
+        told = (jog.hold, decision.reason)
+        if told != self._keys_told:
+            self._keys_told = told
+            self.outbox.put({"type": "jog", "hold": jog.hold, "reason": decision.reason})
 
     def _check_frame(self, jpeg: bytes) -> None:
         limits = self._settings.pipeline.decode
@@ -277,12 +315,14 @@ class OperatorSession:
             case Ping():
                 self.outbox.put({"type": "pong", "t": message.t, "tick": tick_ms()})
             case View():
-                self._detail = message.detail
+                self._detail, self._glass = message.detail, message.glass
             case Speed():
                 self._scale = message.scale
+            case Jog():
+                self._take_jog(message)
             case Picture():
                 self._pictures.saw(message.camera, message.tick)
-            case TakeControl() | HandOver():
+            case TakeControl() | HandOver() | UseGallery():
                 self._queue(message)
             case _ if message.type == "stop":
                 self._begin_stop("the stop button was pressed", "button")
@@ -368,6 +408,10 @@ class OperatorSession:
         if isinstance(message, HandOver):
             await self._hub.people.hand_over(self, message.to)
             return
+        if isinstance(message, UseGallery):
+            await self._gallery.choose(message.gallery)
+            self.tell_gallery()
+            return
         match message.type:
             case "release_control":
                 await self.give_up()
@@ -399,6 +443,17 @@ class OperatorSession:
             if text is None:
                 raise _Closing(CLOSE_TOO_SLOW, "the browser reads too slowly")
             await self._socket.send_text(text)
+
+    def tell_gallery(self) -> None:
+        """Send the ``gallery`` message; a session whose gallery is gone uses the shared one."""
+        self._gallery.check()
+        message = {
+            "type": "gallery",
+            "version": self._hub.gallery.version,
+            "gallery": self._gallery.id,
+            "problem": self._hub.keeper.problem,
+        }
+        self.outbox.put(message)
 
     def tell(self, error: FarhandError, seq: int | None = None) -> None:
         """Send an ``error`` message."""

@@ -8,6 +8,7 @@ from starlette.types import Message
 
 from app.config import GatewaySettings
 from app.errors import Invalid, RequestError, TooLarge
+from app.gestures.records import SHARED
 
 MAX_IMAGES = 50
 MAX_BURST = 120
@@ -34,6 +35,11 @@ class Upload:
     def burst(self) -> bool:
         """Whether the images are the frames of one burst."""
         return self.flag("burst", False)
+
+    @property
+    def gallery(self) -> str:
+        """Id of the gallery that is meant."""
+        return self.fields.get("gallery", SHARED)
 
     def flag(self, name: str, default: bool) -> bool:
         """A field that is ``true`` or ``false``.
@@ -144,7 +150,7 @@ async def read_upload(
     return Upload(fields, images)
 
 
-async def read_image(request: Request, limit: int) -> bytes:
+async def read_image(request: Request, limit: int) -> Upload:
     """Read one image: the whole body, or the field ``image`` of a multipart body.
 
     Raises:
@@ -155,7 +161,7 @@ async def read_image(request: Request, limit: int) -> bytes:
         upload = await read_upload(request, limit, "image")
         if len(upload.images) != 1:
             raise Invalid(f"send one image, not {len(upload.images)}", field="image")
-        return upload.images[0]
+        return upload
     if not kind.startswith("image/") and kind not in ("", "application/octet-stream"):
         raise UnsupportedMedia(f"send an image or multipart/form-data, not {kind}", given=kind)
     parts = []
@@ -165,4 +171,4 @@ async def read_image(request: Request, limit: int) -> bytes:
         if size > limit:
             raise _too_large(limit)
         parts.append(part)
-    return b"".join(parts)
+    return Upload({}, [b"".join(parts)])

@@ -96,19 +96,19 @@ def fingerprint(path: Path) -> Fingerprint | None:
 
 
 def verify(path: Path) -> int:
-    """Check a copy: pages, checksums of all gestures and samples, every version of an action.
+    """Check a copy: pages, checksums of galleries, gestures, samples and versions of actions.
 
     Brings a copy by an older Farhand up to date. Not for a database that is in use.
 
     Returns:
-        How many gestures it holds.
+        How many gestures it holds, in all galleries.
 
     Raises:
         DatabaseBroken: with what is wrong.
     """
     store = GestureStore(url_of(path), None)
     try:
-        gestures = store.list()
+        gestures = store.check()
         for gesture in gestures:
             store.versions(gesture.id)
     except (ValueError, TypeError) as error:

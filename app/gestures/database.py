@@ -101,18 +101,25 @@ def _set_up_sqlite(engine: Engine) -> None:
     driver's own way of opening transactions is switched off (``isolation_level=None``): it would
     begin them as readers, and two readers that both want to write fail at once. Writers begin as
     writers instead (``BEGIN IMMEDIATE``) and wait their turn, for :data:`BUSY_S`.
+
+    Foreign keys are off in transactions that may migrate: to change a table is to make it anew, and
+    dropping the old one would delete all that refers to it
+    (https://www.sqlite.org/lang_altertable.html#otheralter).
     """
 
     @event.listens_for(engine, "connect")
     def connect(connection: sqlite3.Connection, _record: Any) -> None:
         connection.isolation_level = None
-        for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON"):
+        for pragma in ("journal_mode=WAL", "synchronous=FULL"):
             connection.execute(f"PRAGMA {pragma}").fetchall()
 
     @event.listens_for(engine, "begin")
     def begin(connection: Connection) -> None:
-        write = connection.get_execution_options().get("write", False)
-        connection.exec_driver_sql("BEGIN IMMEDIATE" if write else "BEGIN")
+        options = connection.get_execution_options()
+        # Within a transaction it would do nothing.
+        keys = "OFF" if options.get("migrate", False) else "ON"
+        connection.exec_driver_sql(f"PRAGMA foreign_keys={keys}")
+        connection.exec_driver_sql("BEGIN IMMEDIATE" if options.get("write", False) else "BEGIN")
 
     with plain_errors(engine), engine.connect() as connection:
         rows = connection.exec_driver_sql("PRAGMA quick_check(1)").fetchall()
@@ -126,7 +133,7 @@ def migrate(connection: Connection, name: str) -> bool:
     """Bring the database up to date, inside the transaction that is open on ``connection``.
 
     Args:
-        connection: With a transaction for writing; the caller commits it.
+        connection: With a transaction for writing and migrating; the caller commits it.
         name: How messages call the database.
 
     Returns:
@@ -162,6 +169,9 @@ def migrate(connection: Connection, name: str) -> bool:
         )
     if current != scripts.get_current_head():
         alembic.command.upgrade(config, "head")
+        is_sqlite = connection.dialect.name == "sqlite"
+        if is_sqlite and connection.exec_driver_sql("PRAGMA foreign_key_check").first() is not None:
+            raise DatabaseBroken(f"{name} is damaged (a part belongs to nothing); {GO_ON}")
     return current is None
 
 

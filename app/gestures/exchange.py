@@ -2,21 +2,22 @@
 
 from pathlib import Path
 
-from app.gestures.records import Gesture, NewGesture
+from app.gestures.records import SHARED, Gesture, NewGesture
 from app.gestures.setfile import read_set, write_set
 from app.gestures.store import GestureStore
 
 
-def export_set(store: GestureStore, target: Path) -> int:
-    """Write all gestures to a new folder, or to a new file when ``target`` ends in ``.zip``.
+def export_set(store: GestureStore, target: Path, gallery: str = SHARED) -> int:
+    """Write all gestures of a gallery to a new folder, or file when ``target`` ends in ``.zip``.
 
     Returns:
         How many gestures were written.
 
     Raises:
+        NotFound: no gallery has this id.
         Invalid: the target exists and is not an empty folder.
     """
-    gestures = store.list()
+    gestures = store.list(gallery)
     write_set(
         (
             NewGesture(
@@ -32,7 +33,9 @@ def export_set(store: GestureStore, target: Path) -> int:
     return len(gestures)
 
 
-def import_set(store: GestureStore, source: Path, replace: bool = False) -> list[Gesture]:
+def import_set(
+    store: GestureStore, source: Path, replace: bool = False, gallery: str = SHARED
+) -> list[Gesture]:
     """Take all gestures of a folder or zip file into a database: all of them, or none.
 
     Args:
@@ -40,9 +43,11 @@ def import_set(store: GestureStore, source: Path, replace: bool = False) -> list
         source: A set in the exchange format.
         replace: Gestures whose names are taken get the set's action and samples and keep their
             ids; gestures that are not in the set stay as they are.
+        gallery: Id of the gallery that they are to belong to.
 
     Raises:
+        NotFound: no gallery has this id.
         Invalid: the set is not exactly in the format.
         Duplicate: a name is taken, and ``replace`` is off.
     """
-    return store.put_all(read_set(source), replace=replace)
+    return store.put_all(read_set(source), replace=replace, gallery=gallery)

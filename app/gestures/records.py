@@ -16,8 +16,13 @@ TEMPLATE_BYTES = TEMPLATE_WIDTH * TEMPLATE_HEIGHT // 8
 NAME_MAX = 60
 """Characters of a gesture's name."""
 MAX_GESTURES = 500
+"""Gestures of one gallery."""
 MAX_SAMPLES = 1000
 """Samples of one gesture."""
+MAX_GALLERIES = 100
+"""The shared one included."""
+SHARED = "shared"
+"""Id of the gallery that is always there."""
 MAX_VERSIONS = 100
 """Actions of one gesture that are kept; the oldest are forgotten."""
 
@@ -52,6 +57,23 @@ class Gesture:
     """Whether it is matched. An inactive gesture is kept and listed, and moves nothing."""
     version: int = 1
     """Of the action: rises with each change of it."""
+    gallery: str = SHARED
+    """Id of the gallery that it belongs to."""
+    taught: bool = False
+    """Whether a sample of it is newer than its gallery: shown by its person, not copied."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gallery:
+    """One person's gestures; the one whose id is :data:`SHARED` is everybody's."""
+
+    id: str
+    name: str
+    created: datetime
+    """UTC, in steps of a millisecond."""
+    gestures: int
+    taught: int
+    """How many of the gestures are :attr:`Gesture.taught`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,15 +86,19 @@ class ActionVersion:
     """UTC, in steps of a millisecond."""
 
 
-def clean_name(name: str) -> str:
+def clean_name(name: str, what: str = "gesture") -> str:
     """The form in which a name is kept: Unicode NFC, without white space at its ends.
+
+    Args:
+        name: As it was given.
+        what: Whose name it is to be, for the message.
 
     Raises:
         Invalid: empty, longer than 60 characters, or with characters that cannot be seen.
     """
     clean = unicodedata.normalize("NFC", name).strip()
     if not clean:
-        raise Invalid("a gesture needs a name: 1 to 60 characters", field="name", given=name)
+        raise Invalid(f"a {what} needs a name: 1 to 60 characters", field="name", given=name)
     if len(clean) > NAME_MAX:
         raise Invalid(
             f"the name has {len(clean)} characters; at most {NAME_MAX} are allowed",

@@ -18,16 +18,40 @@ class Base(DeclarativeBase):
     """Base of all tables."""
 
 
+SHARED_NUMBER = 1
+"""Number of the shared gallery."""
+
+
+class GalleryRow(Base):
+    """One person's gestures. Times are ms since 1970, UTC."""
+
+    __tablename__ = "galleries"
+
+    number: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=True)
+    """Rises with every gallery made: the order in which they are listed."""
+    id: Mapped[str] = mapped_column(String(32), unique=True)
+    name: Mapped[str] = mapped_column(String(60))
+    name_key: Mapped[str] = mapped_column(String(240), unique=True)
+    created_ms: Mapped[int] = mapped_column(BigInteger)
+    """Samples that are newer were taught; those that were copied are not."""
+    checksum: Mapped[int] = mapped_column(BigInteger)
+    """CRC-32 of the other columns."""
+
+
 class GestureRow(Base):
     """One gesture. Times are ms since 1970, UTC."""
 
     __tablename__ = "gesture"
+    __table_args__ = (UniqueConstraint("gallery", "name_key"),)
 
     number: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=True)
     """Rises with every gesture made: the order in which they are listed."""
     id: Mapped[str] = mapped_column(String(32), unique=True)
+    gallery: Mapped[int] = mapped_column(
+        ForeignKey("galleries.number", ondelete="CASCADE"), server_default=str(SHARED_NUMBER)
+    )
     name: Mapped[str] = mapped_column(String(60))
-    name_key: Mapped[str] = mapped_column(String(240), unique=True)
+    name_key: Mapped[str] = mapped_column(String(240))
     action: Mapped[str] = mapped_column(Text)
     """JSON of :data:`app.link.actions.Action`."""
     created_ms: Mapped[int] = mapped_column(BigInteger)
@@ -38,6 +62,8 @@ class GestureRow(Base):
     """Of the action: rises with each change of it."""
     checksum: Mapped[int] = mapped_column(BigInteger)
     """CRC-32 of the other columns: a damaged action must never move a robot."""
+    home: Mapped[GalleryRow] = relationship(viewonly=True)
+    """The gallery."""
     samples: Mapped[list["SampleRow"]] = relationship(
         order_by="SampleRow.number", cascade="all, delete-orphan", passive_deletes=True
     )
@@ -79,10 +105,10 @@ class SampleRow(Base):
     """CRC-32 of the other columns."""
 
 
-class GalleryRow(Base):
+class CounterRow(Base):
     """The one row that counts changes, so that every process notices what another one did."""
 
-    __tablename__ = "gallery"
+    __tablename__ = "gallery"  # there was one gallery when it was named
 
     id: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=False)
     version: Mapped[int] = mapped_column(BigInteger)

@@ -177,5 +177,10 @@ Action = Annotated[
     JogJoint | JogCartesian | TurnJoint | MoveLinear | Pose | Gripper | Home | Stop | Sequence,
     Field(discriminator="type"),
 ]
+HeldAction = Annotated[
+    JogJoint | JogCartesian | TurnJoint | MoveLinear | Pose | Gripper | Home | Sequence,
+    Field(discriminator="type"),
+]
+"""Those that a held key may do: all but the stop, which waits for nothing."""
 ACTION: TypeAdapter[Action] = TypeAdapter(Action)
 """Validates and serialises any action: ``ACTION.validate_json(b'{"type": "home"}')``."""

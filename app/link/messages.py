@@ -175,6 +175,9 @@ class State(Message):
     tool_position: tuple[float, float, float] = Field(description="m, base frame")
     tool_orientation: tuple[float, float, float, float] = Field(description="quaternion w, x, y, z")
     frame: int | None = Field(default=None, description="frame that caused the motion, if any")
+    began: int | None = Field(
+        default=None, description="tick at which that motion began; null while nothing moves"
+    )
     action: Action | None = Field(default=None, description="what is being done")
     limits: tuple[str, ...] = Field(default=(), description="limits at work, in plain words")
     dropped: dict[str, int] = Field(default_factory=dict, description="commands refused, by reason")

@@ -11,7 +11,7 @@ from app.config import MatchSettings
 from app.errors import Invalid
 from app.pipeline.features import Features
 from app.pipeline.template import HEIGHT, WIDTH
-from app.pipeline.types import F32, U8, Cause, Match
+from app.pipeline.types import F32, U8, Cause, Look, Match
 from app.pipeline.views import Views
 
 OWN_REACH = 1.3
@@ -57,10 +57,24 @@ class Gallery:
 
 
 class Matched(NamedTuple):
-    """The nearest gesture (None when the gallery is empty) and the distance to each."""
+    """The nearest gesture, the distance to each, and more; None, {}, None of an empty gallery."""
 
     match: Match | None
     distances: dict[str, float]
+    look: Look | None = None
+
+
+class Chart(NamedTuple):
+    """The enrolled templates on the first two principal components, to be drawn.
+
+    Attributes:
+        at: (n, 2) the middle of each template's views, in the order of ``PcaMatcher.templates``.
+        share: (2,) part of all that differs among the enrolled views that each axis shows; 0 for an
+            axis that the gallery is too small to have.
+    """
+
+    at: F32
+    share: F32
 
 
 class PcaMatcher:
@@ -82,11 +96,18 @@ class PcaMatcher:
     Unknown (ours): ``d`` above the largest distance, ``e / sqrt(dimensions)`` above the largest
     error, or the second gesture nearly as near. Immutable after :meth:`fit`, so that any number of
     threads may share it.
+
+    Attributes:
+        templates: For each enrolled template its label, and its number among those of the label in
+            the order of the gallery, from 0.
+        chart: Where they lie.
     """
 
     def __init__(self, settings: MatchSettings) -> None:
         self.settings = settings
         self.labels: tuple[str, ...] = ()
+        self.templates: tuple[tuple[str, int], ...] = ()
+        self.chart = Chart(np.zeros((0, 2), np.float32), np.zeros(2, np.float32))
         self.max_distance = settings.max_distance
         self._features = Features(settings)
 
@@ -102,6 +123,8 @@ class PcaMatcher:
         order = sorted(range(len(gallery.labels)), key=lambda i: gallery.labels[i])
         labels = [gallery.labels[i] for i in order]
         self.labels = tuple(dict.fromkeys(labels))
+        first = {label: i for i, label in reversed(list(enumerate(labels)))}
+        self.templates = tuple((label, i - first[label]) for i, label in enumerate(labels))
         views = Views(self.settings)
         per_template = [self._features(views.of_template(gallery.templates[i])) for i in order]
         rows = np.concatenate(per_template)
@@ -116,8 +139,18 @@ class PcaMatcher:
         self._starts: NDArray[np.intp] = np.searchsorted(owner, np.arange(len(order)))
         ends = np.searchsorted(of_template, np.arange(len(self.labels)), side="right")
         self._parts = np.split(np.arange(len(order)), ends[:-1])
+        self.chart = self._chart()
         if self.settings.calibrate:
             self.max_distance = self._calibrated(owner, of_template)
+
+    def _chart(self) -> Chart:
+        drawn = min(2, self._basis.shape[1])
+        first = np.zeros((len(self._rows), 2), np.float32)
+        first[:, :drawn] = self._rows[:, :drawn]
+        views = np.diff(self._starts, append=len(first))
+        share = np.square(first).mean(axis=0) / max(float(self._squares.mean()), TINY)
+        middle = (np.add.reduceat(first, self._starts) / views[:, None]).astype(np.float32)
+        return Chart(middle, share)
 
     def _calibrated(self, owner: NDArray[np.intp], of_template: NDArray[np.intp]) -> float:
         """The largest distance accepted, from how the enrolled templates lie to one another.
@@ -193,7 +226,7 @@ class PcaMatcher:
         best = int(per_label.argmin())
         distance = distances[self.labels[best]]
         margin: float | None = None
-        second = ""
+        second: str | None = None
         if len(self.labels) > 1:
             others = per_label.copy()
             others[best] = np.inf
@@ -207,7 +240,7 @@ class PcaMatcher:
         match = Match(
             self.labels[best], distance, margin, error, cause is None, reason, strangeness, cause
         )
-        return Matched(match, distances)
+        return Matched(match, distances, Look(points[best_view], nearest, second))
 
     def match_template(self, template: U8) -> Matched:
         """Match an (80, 60) template of which nothing else is known."""
@@ -222,7 +255,7 @@ class PcaMatcher:
         return max(parts)
 
     def _why_unknown(
-        self, name: str, distance: float, second: str, margin: float | None, error: float
+        self, name: str, distance: float, second: str | None, margin: float | None, error: float
     ) -> tuple[Cause, str] | tuple[None, None]:
         if distance > self.max_distance:
             return "unknown_hand", (

@@ -83,6 +83,11 @@ class MotionGate:
         self._last = Motion(None, False, False, False, False)
         self._past.clear()
 
+    @property
+    def mismatch(self) -> U8 | None:
+        """(h, w), 1 where the last sample differs: a buffer. None before three were sampled."""
+        return None if self._last.fraction is None else self._mismatch
+
     def __call__(self, mask: U8, now: float) -> Motion:
         """Look at one (h, w) mask of 0 and 1; ``now`` in seconds, monotonic."""
         if self._frames and self._frames[0].shape != mask.shape:

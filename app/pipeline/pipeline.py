@@ -11,7 +11,7 @@ from app.pipeline.motion import MotionGate
 from app.pipeline.palm import Palm
 from app.pipeline.roi import RegionOfInterest
 from app.pipeline.template import MakeTemplate
-from app.pipeline.types import U8, Box, Cause, FrameResult, GestureEvent, WristCut
+from app.pipeline.types import U8, Box, Cause, Circle, FrameResult, GestureEvent, WristCut
 from app.pipeline.views import Views
 from app.pipeline.wrist import WristCrop
 
@@ -118,6 +118,7 @@ class Pipeline:
         shown = matched.match.gesture if matched.match and matched.match.accepted else None
         strangeness = matched.match.strangeness if matched.match else 1.0
         event = self._agree(shown, seq, now, strangeness=strangeness, settled=motion.settled)
+        mismatch = self._gate.mismatch
         scale_x, scale_y = frame.width / palm.piece.shape[1], frame.height / palm.piece.shape[0]
         return FrameResult(
             seq=seq,
@@ -137,6 +138,9 @@ class Pipeline:
             event=event,
             gesture=self._agree.gesture,
             looks=self._find_hand.looks,
+            mismatch=None if mismatch is None else mismatch.copy(),
+            palm=None if cause == "no_hand" else scale_palm(palm, scale_x, scale_y),
+            look=matched.look,
         )
 
 
@@ -162,6 +166,12 @@ def scale_box(box: Box | None, scale_x: float, scale_y: float) -> Box | None:
     x, y, width, height = box
     left, top = round(x * scale_x), round(y * scale_y)
     return left, top, round((x + width) * scale_x) - left, round((y + height) * scale_y) - top
+
+
+def scale_palm(palm: Palm, scale_x: float, scale_y: float) -> Circle:
+    """The palm of the working picture in pixels of the source; its radius by the mean scale."""
+    radius = palm.radius * (scale_x + scale_y) / 2
+    return Circle(round(palm.x * scale_x), round(palm.y * scale_y), radius)
 
 
 def scale_cut(cut: WristCut | None, scale_x: float, scale_y: float) -> WristCut | None:

@@ -40,6 +40,29 @@ class WristCut(NamedTuple):
     at: int
 
 
+class Circle(NamedTuple):
+    """The palm's largest inscribed circle, in pixels."""
+
+    x: int
+    y: int
+    radius: float
+
+
+class Look(NamedTuple):
+    """Where one hand lies among the enrolled templates.
+
+    Attributes:
+        point: (k + 1,) coordinates of the view that is nearest to an enrolled one: the principal
+            components, then the reconstruction error.
+        distances: (n,) to each enrolled template, in the order of ``PcaMatcher.templates``.
+        second: The gesture that is nearest but one; None when only one is enrolled.
+    """
+
+    point: F32
+    distances: F32
+    second: str | None
+
+
 @dataclass(frozen=True)
 class Match:
     """The enrolled gesture nearest to a picture.
@@ -96,6 +119,10 @@ class FrameResult:
         event: What changed with this frame.
         gesture: The gesture that is held now.
         looks: How often the mask network ran; 0 by threshold, and when the last mask stands.
+        mismatch: (h, w), 1 where the motion gate saw a change, as large as the mask; its own copy.
+            None before three frames were sampled.
+        palm: In pixels of the frame as sent; None without a hand.
+        look: Where the hand lies among what is enrolled; None when nothing was matched.
     """
 
     seq: int
@@ -115,6 +142,9 @@ class FrameResult:
     cause: Cause | None = None
     digest: int = 0
     looks: int = 0
+    mismatch: U8 | None = None
+    palm: Circle | None = None
+    look: Look | None = None
 
     def as_message(self, tick: int = 0) -> dict[str, Any]:
         """The ``frame`` message of docs/protocol.md. A match that was not accepted is null."""
@@ -135,6 +165,7 @@ class FrameResult:
             "mask": {"mode": self.way.mode, "why": self.way.why},
             "match": match,
             "reason": self.reason,
+            "cause": self.cause,
             "timing_ms": {stage: round(ms, 3) for stage, ms in self.timing_ms.items()},
         }
 

@@ -84,6 +84,7 @@ class Controller:
         self._ended = -1
         """The newest showing that is over."""
         self._frame: int | None = None
+        self._began = 0
         self._note: str | None = None
         self._stopping_since = now
         self._brake(engaged=True)
@@ -132,7 +133,7 @@ class Controller:
                 self._let_go()
                 self._note = "the action changed while its gesture was held: show it again"
         elif command.hold > self._ended:
-            self._begin(command)
+            self._begin(command, now)
 
     def cycle(self, now: float, commands: Iterable[Command] = ()) -> None:
         """Let 1/240 s pass."""
@@ -184,6 +185,7 @@ class Controller:
             tool_position=tuple(reading.tool.position.tolist()),
             tool_orientation=tuple(reading.tool.orientation.tolist()),
             frame=self._frame if motion.busy else None,
+            began=self._began if motion.busy else None,
             action=motion.action,
             limits=motion.limits,
             clearance=motion.guard.clearance,
@@ -251,7 +253,7 @@ class Controller:
         if self._hold is not None and self.motion.busy:
             self.safety.hold(DOUBTS[doubt])
 
-    def _begin(self, command: Command) -> None:
+    def _begin(self, command: Command, now: float) -> None:
         """A new showing of a gesture."""
         assert command.action is not None
         self._let_go()
@@ -264,6 +266,7 @@ class Controller:
             return  # still coming to rest; the command after this one will be in time
         self.motion.begin(command.action)
         self._hold, self._frame, self._note = command.hold, command.frame, None
+        self._began = tick_of(now)
 
     def _let_go(self) -> None:
         """The showing of a gesture is over, if there was one."""

@@ -3,6 +3,9 @@
 import { api } from "./core/api.js";
 import { CameraFeed } from "./core/camera-feed.js";
 import { FrameSender } from "./core/frame-sender.js";
+import { GamepadReader } from "./core/gamepad.js";
+import { Held } from "./core/held.js";
+import { Latency } from "./core/latency.js";
 import { grabStill } from "./core/jpeg.js";
 import { changesFor, INITIAL_STATE } from "./core/messages.js";
 import { OperatorLink } from "./core/operator-link.js";
@@ -14,8 +17,10 @@ import { Store } from "./core/store.js";
 import { texts } from "./texts/en.js";
 import { dockButtons, steps, stopButton } from "./ui/dock.js";
 import { gestureList } from "./ui/gesture-list.js";
+import { glassFold } from "./ui/glass-fold.js";
 import { connection, driver, goneOverlay, statePill } from "./ui/header.js";
 import { keys } from "./ui/keys.js";
+import { latencyBar } from "./ui/latency-bar.js";
 import { Notices } from "./ui/notices.js";
 import { operatorView, sourceChoices } from "./ui/operator-view.js";
 import { isDriving, keepRootClasses, preparePage } from "./ui/page.js";
@@ -57,8 +62,11 @@ const robotId = () => {
 };
 const stopper = new Stopper(link, api, robotId);
 const clock = new ServerClock(link);
+const latency = new Latency(clock);
 const when = (tick) => clock.when(tick);
 const feeds = { wrist: new CameraFeed("wrist", when), scene: new CameraFeed("scene", when) };
+const held = new Held(link);
+let jog = { down: () => false, up: () => {}, pad: () => {} }; // until somebody drives by keys
 const counts = { hello: 0, frame: 0, gesture: 0, robot: 0, gallery: 0, pong: 0, error: 0 };
 let lastError = null;
 
@@ -80,16 +88,47 @@ store.set({ speed: knownSpeed(memory.get("speed")), fine: memory.get("fine") ===
 speed(byId("dock-speed"), store);
 sentence(byId("sentence"), byId("sentence-spoken"), store);
 const video = operatorView(byId("operator"), store);
+store.set({ glass: memory.get("glass") === "open" });
+glassFold(byId("glass"), store, { templateUrl: api.templateUrl });
 gestureList(byId("gestures"), store, { templateUrl: api.templateUrl });
 readout(byId("readout"), store);
 const pressed = keys(root, {
     closeSheet: () => sheets.close(),
     canMove: () => Boolean(store.state.robot && store.state.robot.armed),
+    jog: { down: (event) => jog.down(event), up: (event) => jog.up(event) },
 });
 const views = stage(byId("stage"), store, { feeds, onFrame: pressed.listen, memory });
+const reading = () => latency.reading(performance.now(), byId("stage").dataset.large);
+latencyBar(byId("stage"), reading);
 
 const sender = new FrameSender(link, video);
 const source = new SourceKeeper(video, store, sender);
+
+// Who drives by keys
+
+let jogAsked = false;
+const byKeys = () => store.state.source.kind === "keys";
+
+async function loadJog() {
+    jogAsked = true;
+    const { jogPad } = await import("./ui/jog.js");
+    jog = jogPad(byId("jog"), store, {
+        held,
+        mayPress: () => !sheets.name,
+        stop: () => wishes.stop(),
+    });
+    new GamepadReader(byKeys, (wanted) => jog.pad(wanted));
+}
+
+store.watch(["connection", "hello", "robot", "source"], (state) => {
+    byId("jog").hidden = !byKeys();
+    if (byKeys() && !jogAsked) loadJog();
+    if (byKeys() && isDriving(state)) held.start();
+    else held.stop();
+});
+// A key that goes up while another window has the focus is never heard of.
+window.addEventListener("blur", () => held.release());
+document.addEventListener("visibilitychange", () => held.release());
 
 // Sheets and notices end where the dock begins, however tall its words make it.
 new ResizeObserver(([entry]) => {
@@ -106,7 +145,10 @@ let closedTries = 0;
 
 link.addEventListener("state", async ({ detail }) => {
     if (detail.state === "open") sendView();
-    if (detail.state !== "open") sender.forget();
+    if (detail.state !== "open") {
+        sender.forget();
+        latency.forget();
+    }
     if (detail.state === "waiting") {
         // A browser does not say why a WebSocket was refused; REST does.
         const check = ++signInCheck;
@@ -147,6 +189,7 @@ link.addEventListener("message", ({ detail: message }) => {
     if (message.type === "hello") greeted();
     else if (message.type === "robot") {
         stopper.saw(message);
+        latency.robot(message, isDriving(store.state), performance.now());
         // A robot that is silent for a moment names no driver: nothing is lost by that.
         if (message.online) {
             const drives = isDriving(store.state);
@@ -158,8 +201,9 @@ link.addEventListener("message", ({ detail: message }) => {
             notices.show(texts.people.yours, { kind: "good", name: "control" });
         }
         describeRobot();
-    } else if (message.type === "frame") sender.answered(message.seq);
-    else if (message.type === "gallery") {
+    } else if (message.type === "frame") {
+        latency.frame(message, sender.answered(message.seq), performance.now());
+    } else if (message.type === "gallery") {
         tellProblem(message.problem);
         loadGestures();
     }
@@ -233,9 +277,10 @@ async function loadGestures() {
     }
 }
 
-/** Masks and distances cost the server a little: only while somebody looks. */
+/** Masks and distances cost the server a little, the glass box more: only while somebody looks. */
 function sendView() {
-    link.send("view", { detail: document.visibilityState !== "hidden" });
+    const detail = document.visibilityState !== "hidden";
+    link.send("view", { detail, glass: detail && store.state.glass });
 }
 document.addEventListener("visibilitychange", () => {
     sendView();
@@ -248,6 +293,7 @@ let reported = {};
 for (const [name, feed] of Object.entries(feeds)) {
     feed.addEventListener("picture", ({ detail }) => {
         shown[name] = { tick: detail.tick, takenAt: detail.takenAt, shownAt: performance.now() };
+        latency.picture(name, shown[name]);
     });
 }
 
@@ -447,6 +493,11 @@ const wishes = {
         link.send("hand_over", { to });
     },
     "toggle-arm": toggleArm,
+    glass: ({ open }) => {
+        store.set({ glass: open });
+        memory.set("glass", open ? "open" : "folded");
+        sendView();
+    },
     "toggle-fine": () => {
         if (isDriving(store.state)) setSpeed({ fine: !store.state.fine });
     },
@@ -471,7 +522,7 @@ byId("teach-open").addEventListener("click", () => teach());
  * For tests in a browser and for the curious; reads only. `robot`, `frame`, `gesture`, `hello` are
  * the newest messages, `counts` how many of each type came, `frames` what became of the webcam's
  * pictures, `pictures` how many each robot camera has shown, `shown` what the newest of them is
- * ({tick, takenAt, shownAt}), `error` the newest `error` message.
+ * ({tick, takenAt, shownAt}), `latency` where a frame's time goes, `error` the newest `error` message.
  */
 window.farhand = Object.freeze({
     get state() {
@@ -504,6 +555,9 @@ window.farhand = Object.freeze({
     },
     get shown() {
         return { ...shown };
+    },
+    get latency() {
+        return reading();
     },
 });
 

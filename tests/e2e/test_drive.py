@@ -59,6 +59,7 @@ def test_a_hand_shown_to_the_webcam_moves_the_arm_and_the_page_shows_it(
     wait_for(page, f"window.farhand.robot.tool.position[2] > {low + 0.05}")
     assert page.evaluate("window.farhand.robot.joints") != joints
     # It says how the hand is told from the room, and why so.
+    page.click("#glass-toggle")
     expect(page.locator("#seen-mask")).to_have_text(
         re.compile("^(learned mask|plain threshold), because the background "), timeout=SLOW
     )

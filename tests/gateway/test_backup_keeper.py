@@ -143,7 +143,7 @@ def test_a_database_that_breaks_while_the_server_runs_keeps_it_from_arming(
     with server.operator() as operator:
         take(operator)
         store = GestureStore(f"sqlite:///{folder / 'data' / DATABASE_FILE}", None)
-        with store._write() as session:
+        with store.base.write() as session:
             session.connection().exec_driver_sql("UPDATE sample SET template = zeroblob(600)")
             session.connection().exec_driver_sql("UPDATE gallery SET version = version + 1")
         store.close()
@@ -159,7 +159,7 @@ def test_a_backup_that_does_not_pass_its_check_keeps_the_robot_from_being_armed(
     place = Place(tmp_path / "gestures.db", tmp_path / "backups")
     store = GestureStore(f"sqlite:///{place.database}", None)
     store.create("a", Home(), [bytes(300) + b"\xff" * 300])
-    with store._write() as session:
+    with store.base.write() as session:
         session.connection().exec_driver_sql("UPDATE gesture SET action = '{}'")
     store.close()
     keeper = BackupKeeper(place, 5)
@@ -171,7 +171,7 @@ def test_a_backup_that_does_not_pass_its_check_keeps_the_robot_from_being_armed(
 def test_a_full_disk_is_507_and_driving_and_stopping_go_on(
     server: Running, node: StandIn, hand: Hand
 ) -> None:
-    engine = server.hub.store._engine
+    engine = server.hub.store.base.engine
 
     @event.listens_for(engine, "begin")
     def full(connection: object) -> None:

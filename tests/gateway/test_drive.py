@@ -55,7 +55,7 @@ def let_go(driver: Driver, begin: float = 2.0, seconds: float = 0.5) -> None:
 
 @pytest.fixture
 def driver() -> Driver:
-    return Driver("me", Counter())
+    return Driver("me", Counter(), Counter())
 
 
 def test_a_frame_without_a_gesture_is_a_command_too(driver: Driver) -> None:
@@ -73,7 +73,8 @@ def test_sequence_rises_and_a_hold_stays_while_the_gesture_does(driver: Driver) 
         for frame, gesture in enumerate(["forward", "forward", None, "forward", "home"])
     ]
     assert all(commands)
-    assert [command.sequence for command in commands] == [1, 2, 3, 4, 5]
+    first = commands[0].sequence
+    assert [command.sequence - first for command in commands] == [0, 1, 2, 3, 4]
     holds = [command.hold for command in commands]
     assert holds[0] == holds[1]
     assert holds[1] < holds[3] < holds[4]
@@ -93,8 +94,8 @@ def test_a_gesture_that_ended_with_the_frames_begins_anew(driver: Driver) -> Non
 
 def test_two_sessions_never_share_a_hold() -> None:
     holds = Counter()
-    first = Driver("a", holds).decide("home", 1, READY).command
-    second = Driver("b", holds).decide("home", 1, READY).command
+    first = Driver("a", holds, Counter()).decide("home", 1, READY).command
+    second = Driver("b", holds, Counter()).decide("home", 1, READY).command
     assert first is not None
     assert second is not None
     assert first.hold != second.hold
@@ -274,6 +275,19 @@ def test_a_jog_under_way_goes_on_when_other_gestures_change(driver: Driver) -> N
     decision = driver.decide("forward", 2, at(0.1))
     assert decision.command is not None
     assert decision.command.action == ACTIONS["forward"]
+
+
+def test_a_jog_under_way_ends_when_the_gestures_become_another_persons(driver: Driver) -> None:
+    driver.decide("forward", 1, at(0.0))
+    driver.gestures_changed(all_of_them=True)
+    for frame, seconds, gesture in ((2, 0.1, "forward"), (4, 0.2, "forward"), (6, 0.3, "open")):
+        decision = driver.decide(gesture, frame, at(seconds))
+        assert decision.command is not None
+        assert decision.command.action is None
+        assert "the gestures changed while a hand was up" in str(decision.reason)
+        driver.decide(None, frame + 1, at(seconds + 0.05))
+    let_go(driver, 0.4)
+    assert driver.decide("forward", 9, at(1.0)).reason is None
 
 
 @pytest.mark.parametrize("cause", ["no_hand", "unknown_hand", "two_hands", "low_margin"])

@@ -521,7 +521,9 @@ def test_a_detail_view_brings_masks_and_distances(server: Running, hand: Hand) -
             operator, hand("home"), lambda frame: "detail" in frame and frame["match"]
         )
         detail = frame["detail"]
-        assert set(detail) == {"mask", "template", "distances", "threshold", "wrist"}
+        assert set(detail) == {"mask", "template", "distances", "threshold", "wrist"}, (
+            "what lies between comes only for who asks"
+        )
         assert detail["distances"]["home"] < detail["threshold"]
         template = decode(detail["template"])
         assert template.shape == (80, 60)
@@ -531,6 +533,78 @@ def test_a_detail_view_brings_masks_and_distances(server: Running, hand: Hand) -
         operator.send("ping", t=0)
         operator.next("pong")
         assert "detail" not in operator.show(hand("home"))
+
+
+def test_the_glass_box_gets_every_step_between(server: Running, hand: Hand) -> None:
+    with server.operator() as operator:
+        operator.send("view", detail=True, glass=True)
+        frame = show_until(
+            operator, hand("home"), lambda frame: "detail" in frame and frame["match"]
+        )
+        glass = frame["detail"]["glass"]
+        assert decode(glass["mismatch"]).shape == decode(frame["detail"]["mask"]).shape
+        assert frame["motion"] < glass["motion_limit"]
+        # The palm is in the box; the histogram is that of the mask, with its maximum at the palm.
+        x, y, width, height = frame["roi"]
+        assert x < glass["palm"]["x"] < x + width
+        assert y < glass["palm"]["y"] < y + height
+        assert glass["histogram"]["axis"] == "y"
+        assert frame["detail"]["wrist"]["side"] == "bottom"
+        mask = decode(frame["detail"]["mask"]) > 0
+        assert np.mean(glass["histogram"]["shares"]) == pytest.approx(mask.mean(), abs=0.02)
+
+        gestures = {g["id"]: g for g in server.http.get("/api/gestures").json()}
+        nearest = glass["nearest"]
+        assert len(nearest) == 5
+        assert [each["distance"] for each in nearest] == sorted(e["distance"] for e in nearest)
+        for each in nearest:
+            assert gestures[each["id"]]["name"] == each["gesture"]
+            assert 0 <= each["sample"] < gestures[each["id"]]["samples"]
+        # It is that sample, and no other: as the server draws it.
+        best = nearest[0]
+        url = f"/api/gestures/{best['id']}/template.png?sample={best['sample']}"
+        drawn = cv2.imdecode(
+            np.frombuffer(server.http.get(url).content, np.uint8), cv2.IMREAD_GRAYSCALE
+        )
+        assert drawn is not None
+        assert np.mean((drawn > 0) == (decode(frame["detail"]["template"]) > 0)) > 0.9
+
+        answer = glass["answer"]
+        distances = frame["detail"]["distances"]
+        first, second = sorted(distances, key=distances.__getitem__)[:2]
+        assert (answer["gesture"], answer["second"], answer["accepted"]) == (first, second, True)
+        assert answer["margin"] == pytest.approx(distances[second] - distances[first], abs=2e-4)
+        assert answer["margin"] > answer["min_margin"]
+
+        projection = glass["projection"]
+        assert sorted(projection["gestures"]) == sorted(distances)
+        assert len(projection["templates"]) == sum(g["samples"] for g in gestures.values())
+        places = np.array([template[1:] for template in projection["templates"]])
+        nearest = np.linalg.norm(places - projection["query"], axis=1).argmin()
+        assert projection["gestures"][projection["templates"][nearest][0]] == "home"
+        assert 0 < sum(projection["share"]) < 1
+
+        operator.send("view", detail=True)
+        operator.send("ping", t=0)
+        operator.next("pong")
+        frame = show_until(operator, hand("home"), lambda frame: "detail" in frame)
+        assert "glass" not in frame["detail"]
+
+
+def test_the_glass_box_of_an_empty_room_shows_that_nothing_is_there(
+    server: Running, hand: Hand
+) -> None:
+    with server.operator() as operator:
+        operator.send("view", detail=True, glass=True)
+        frame = show_until(
+            operator, hand(None), lambda frame: "detail" in frame and frame["motion"] is not None
+        )
+        assert frame["cause"] == "no_hand"
+        glass = frame["detail"]["glass"]
+        assert not decode(glass["mismatch"]).any()
+        assert (glass["palm"], glass["histogram"], glass["nearest"]) == (None, None, [])
+        assert (glass["answer"], glass["projection"]["query"]) == (None, None)
+        assert glass["projection"]["templates"]
 
 
 def decode(png: str) -> np.ndarray:
@@ -632,6 +706,31 @@ def test_who_sees_an_old_picture_of_the_robot_moves_nothing(
         wait_for(lambda: node.commands[-1].doubt == "stale_picture", "the reason at the robot")
         operator.send("picture", camera="scene", tick=node.state().tick)
         show_until(operator, hand("forward"), lambda frame: frame["doubt"] is None)
+
+
+def test_held_keys_command_the_robot_and_frames_do_not_meanwhile(
+    server: Running, node: StandIn, hand: Hand
+) -> None:
+    up = {"type": "jog_cartesian", "frame": "base", "linear": [0.0, 0.0, 0.1]}
+    with server.operator() as operator:
+        operator.send("jog", hold=1, action=up, tick=operator.tick)
+        refused = operator.next("jog", hold=1)
+        assert refused["reason"] == "nobody has control: take control first"
+        take_and_arm(operator)
+        operator.send("jog", hold=2, action=up, scale=0.5, tick=operator.tick)
+        command = wait_for(
+            lambda: next((c for c in node.commands if c.action is not None), None), "no command"
+        )
+        assert command.action.model_dump(exclude={"duration"})["linear"] == (0.0, 0.0, 0.1)
+        assert (command.scale, command.frame) == (0.5, None)
+        before = len(node.commands)
+        answer = operator.show(hand("open"))
+        assert answer["reason"] in (None, answer["reason"])
+        operator.send("jog", hold=2, action=None, tick=operator.tick)
+        wait_for(lambda: len(node.commands) > before, "nothing held is no command")
+        assert all(c.frame is None for c in node.commands[before:])
+        operator.send("jog", hold=3, action=up, tick=max(1, operator.tick - 5000))
+        assert "too old to move the robot" in operator.next("jog", hold=3)["reason"]
 
 
 def test_the_speed_that_is_asked_for_goes_to_the_robot(

@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
@@ -13,10 +14,12 @@ from app.gateway.app import create_app
 from app.gateway.errors import _HTTP_CODES
 from app.gateway.messages import _CLIENT_MESSAGE
 from app.gateway.uploads import MAX_BURST, MAX_IMAGES
+from app.gestures.records import MAX_GALLERIES, MAX_GESTURES
 from app.link import actions
 from app.pipeline import STAGES
 from app.pipeline.burst import KEPT, MAX_FRAMES
 from app.pipeline.confusion import LIKELY, POSSIBLE
+from app.pipeline.types import Cause
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "protocol.md").read_text()
@@ -76,6 +79,11 @@ def test_every_stage_is_documented() -> None:
         assert f"`{stage}`" in TEXT, stage
 
 
+def test_every_cause_is_documented() -> None:
+    for cause in get_args(Cause):
+        assert f"`{cause}`" in TEXT, cause
+
+
 def test_every_word_for_what_is_wrong_with_an_image_is_documented() -> None:
     codes = set()
     for name in ("quality", "still", "burst", "confusion"):
@@ -104,6 +112,7 @@ def test_the_limits_are_the_settings() -> None:
     assert settings.gateway.max_burst_bytes == 16 << 20
     assert (MAX_IMAGES, MAX_BURST, MAX_FRAMES, KEPT) == (50, 120, 120, 8)
     assert (LIKELY, POSSIBLE) == (0.9, 0.7)
+    assert (MAX_GALLERIES, MAX_GESTURES) == (100, 500)
     assert settings.gateway.max_bad_messages == 10
     assert settings.gateway.max_sessions == 32
     assert settings.gateway.max_observers == 100

@@ -73,8 +73,10 @@ def test_a_shown_gesture_moves_the_arm_while_it_is_held(ready: Running, hand: Ha
         moving = operator.next("robot", mode="moving")
         assert moving["action"]["linear"] == [-0.1, 0.0, 0.0]
         assert 0 < moving["seq"] <= operator.seq
+        assert 0 <= moving["state_tick"] - moving["seq_tick"] < 10_000
         assert max(map(abs, moving["velocities"])) > 0
         stream(operator, hand(None), lambda: ready.hub.robot.state.mode == "armed")
+        assert operator.next("robot", mode="armed")["seq_tick"] is None
         wait_for(lambda: max(map(abs, ready.hub.robot.state.velocities)) < 1e-3, "rest")
         resting = x_of(ready)
         time.sleep(0.3)

@@ -278,7 +278,7 @@ def test_unknown_routes_and_methods_have_the_same_shape(server: Running) -> None
 def test_what_goes_wrong_inside_is_not_told(
     server: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def broken() -> None:
+    def broken(_gallery: str) -> None:
         raise RuntimeError("secret detail")
 
     monkeypatch.setattr(server.hub.store, "list", broken)

@@ -70,7 +70,7 @@ def test_a_broken_starter_set_leaves_no_half_made_database(tmp_path: Path) -> No
 
 
 def test_commits_are_durable_and_keys_are_kept(store: GestureStore) -> None:
-    with store._engine.connect() as connection:
+    with store.base.engine.connect() as connection:
         pragma = {
             name: connection.exec_driver_sql(f"PRAGMA {name}").scalar_one()
             for name in ("journal_mode", "synchronous", "foreign_keys")
@@ -161,7 +161,7 @@ def test_a_newer_database_is_refused_by_its_version(tmp_path: Path) -> None:
     make(path)
     execute(path, "UPDATE alembic_version SET version_num = '0999'")
     message = broken(path)
-    assert "was written by a newer Farhand (its version 0999, this one knows 0003)" in message
+    assert "was written by a newer Farhand (its version 0999, this one knows 0004)" in message
 
 
 def test_tables_that_are_missing_are_noticed(tmp_path: Path) -> None:
@@ -177,7 +177,7 @@ def test_migrations_make_exactly_the_tables_that_the_code_uses(store: GestureSto
 
     from app.gestures.tables import Base
 
-    with store._engine.connect() as connection:
+    with store.base.engine.connect() as connection:
         assert compare_metadata(MigrationContext.configure(connection), Base.metadata) == []
 
 
@@ -219,7 +219,7 @@ def test_a_folder_that_cannot_be_written_is_one_clear_line(tmp_path: Path) -> No
 
 
 def test_a_database_that_turns_read_only_is_one_clear_line(store: GestureStore) -> None:
-    with store._engine.connect() as connection:
+    with store.base.engine.connect() as connection:
         connection.exec_driver_sql("PRAGMA query_only=ON")
     with pytest.raises(CannotStart, match="cannot be written"):
         store.create("a", Home(), [template()])
@@ -228,7 +228,7 @@ def test_a_database_that_turns_read_only_is_one_clear_line(store: GestureStore) 
 def test_a_database_that_another_program_holds_is_busy_not_broken(tmp_path: Path) -> None:
     path = tmp_path / "x.db"
     store = GestureStore(url(path), None)
-    with store._engine.connect() as connection:
+    with store.base.engine.connect() as connection:
         connection.exec_driver_sql("PRAGMA busy_timeout=50")
     other = sqlite3.connect(path, isolation_level=None)
     other.execute("BEGIN IMMEDIATE")

@@ -219,7 +219,7 @@ def test_one_of_many_threads_gets_a_name(store: GestureStore) -> None:
 def test_a_full_disk_changes_nothing(tmp_path: Path) -> None:
     store = GestureStore(url(tmp_path / "x.db"), None)
     made = store.create("a", Home(), [template()])
-    with store._engine.connect() as connection:
+    with store.base.engine.connect() as connection:
         pages = connection.exec_driver_sql("PRAGMA page_count").scalar_one()
         # SQLite says the same as on a full disk when a file reaches its greatest size.
         connection.exec_driver_sql(f"PRAGMA max_page_count={pages + 3}")

@@ -44,7 +44,7 @@ def test_an_action_stored_without_a_newer_field_is_still_the_same(
     tmp_path: Path, store: GestureStore
 ) -> None:
     made = store.create("a", Gripper(width=0.0), [template()])
-    with store._write() as session:
+    with store.base.write() as session:
         row = store._row(session, made.id)
         row.action = '{"type":"gripper","width":0.0}'
         store._touch(session, row)
@@ -90,7 +90,7 @@ def test_versions_go_with_their_gesture(tmp_path: Path, store: GestureStore) -> 
     made = store.create("a", Home(), [template()])
     store.update(made.id, action=Stop())
     store.delete(made.id)
-    with store._engine.connect() as connection:
+    with store.base.engine.connect() as connection:
         count = connection.exec_driver_sql("SELECT count(*) FROM action_versions").scalar()
     assert count == 0
 

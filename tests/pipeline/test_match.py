@@ -8,12 +8,14 @@ from app.config import MatchSettings
 from app.errors import Invalid
 from app.pipeline import Gallery, PcaMatcher
 from app.pipeline.features import Features
+from app.pipeline.match import Matched
 from app.pipeline.palm import PalmFinder
 from app.pipeline.views import Views
 from tests.pipeline.drawing import draw_mask, gallery
 
 SETTINGS = MatchSettings()
 PAPER = MatchSettings(features="binary", turns=(0.0,), cuts=(), trims=(0.0,))
+ONE_VIEW = PAPER.model_copy(update={"shears": ()})
 GALLERY = gallery()
 
 
@@ -42,7 +44,7 @@ def test_same_shape_elsewhere_is_recognised(shape, change):
 
 
 def test_empty_gallery_never_matches():
-    assert PcaMatcher.fit(Gallery.empty(), SETTINGS)(views("one")) == (None, {})
+    assert PcaMatcher.fit(Gallery.empty(), SETTINGS)(views("one")) == Matched(None, {})
 
 
 @pytest.mark.parametrize("settings", [SETTINGS, PAPER], ids=["product", "paper"])
@@ -106,6 +108,52 @@ def test_more_samples_lie_nearer():
         np.concatenate([GALLERY.templates, *(g.templates for g in extra)]),
     )
     assert PcaMatcher.fit(both, SETTINGS)(views("two", scale=0.6)).distances["two"] <= far + 1e-3
+
+
+def test_a_look_tells_how_far_each_template_is_and_which_sample_of_which_gesture_it_is():
+    extra = gallery(("two",), scale=0.6)
+    both = Gallery(
+        (*extra.labels, *GALLERY.labels), np.stack([*extra.templates, *GALLERY.templates])
+    )
+    matcher = PcaMatcher.fit(both, SETTINGS)
+    assert len(matcher.templates) == len(GALLERY.labels) + 1
+    assert [sample for label, sample in matcher.templates if label == "two"] == [0, 1]
+    # The sample that was enrolled first has number 0.
+    for sample, template in enumerate((extra.templates[0], GALLERY.templates[2])):
+        matched = matcher.match_template(template)
+        assert matched.look is not None
+        assert matched.match is not None
+        nearest = int(matched.look.distances.argmin())
+        assert matcher.templates[nearest] == ("two", sample)
+        assert matched.look.distances[nearest] == pytest.approx(0, abs=5e-3)
+        others = {k: v for k, v in matched.distances.items() if k != "two"}
+        assert matched.look.second == min(others, key=others.__getitem__)
+    one = PcaMatcher.fit(Gallery(("one",), GALLERY.templates[1:2]), SETTINGS)
+    look = one.match_template(GALLERY.templates[1]).look
+    assert look is not None
+    assert look.second is None
+
+
+@pytest.mark.parametrize("settings", [SETTINGS, ONE_VIEW], ids=["product", "one view"])
+def test_a_chart_shows_where_the_templates_lie(settings):
+    matcher = PcaMatcher.fit(GALLERY, settings)
+    assert matcher.chart.at.shape == (len(GALLERY.labels), 2)
+    first, second = matcher.chart.share
+    assert 1 > first >= second > 0
+    if settings is ONE_VIEW:
+        # The template itself, whose point is exact.
+        for row, label in enumerate(matcher.labels):
+            template = GALLERY.templates[GALLERY.labels.index(label)]
+            look = matcher.match_template(template).look
+            assert look is not None
+            assert look.point[:2] == pytest.approx(matcher.chart.at[row], abs=1e-2)
+
+
+def test_a_gallery_too_small_for_two_axes_has_a_chart_all_the_same():
+    assert PcaMatcher.fit(Gallery.empty(), ONE_VIEW).chart.at.shape == (0, 2)
+    two = PcaMatcher.fit(Gallery(("a", "b"), GALLERY.templates[:2]), ONE_VIEW)
+    assert two.chart.share == pytest.approx([1, 0], abs=1e-3)
+    assert two.chart.at[:, 1] == pytest.approx(0)
 
 
 def test_wrong_shapes_are_refused():

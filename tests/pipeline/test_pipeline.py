@@ -179,6 +179,7 @@ def test_message_is_plain_json():
         "mask",
         "match",
         "reason",
+        "cause",
         "timing_ms",
     ]
     assert (message["type"], message["seq"], message["tick"]) == ("frame", 9, 7)
@@ -187,13 +188,34 @@ def test_message_is_plain_json():
     assert message["reason"] is None
 
 
+def test_results_show_what_moved_and_where_the_palm_is():
+    moving = show(pipeline(), [jpeg(draw("two", shift=(40 * n, 0))) for n in range(3)])
+    assert [result.mismatch is None for result in moving] == [True, True, False]
+    last = moving[-1]
+    assert last.mismatch.shape == last.mask.shape
+    assert last.mismatch.mean() == pytest.approx(last.motion)
+    assert (last.cause, last.look) == ("moving", None)
+    # In the frame's own pixels: the hand is as far to the right as it was drawn.
+    assert last.palm.x - moving[0].palm.x == pytest.approx(80, abs=4)
+    x, y, width, height = last.roi
+    assert x < last.palm.x < x + width
+    assert y < last.palm.y < y + height
+    assert last.palm.radius < width / 2
+
+    still = show(pipeline(), [jpeg(draw("two"))] * 10)[-1]
+    assert still.look.distances.min() <= still.match.distance + 1e-6
+    assert show(pipeline(), [WALL])[-1].palm is None
+
+
 def test_results_stay_valid_after_the_next_frame():
     pipe = pipeline()
     first = show(pipe, [jpeg(draw("two"))] * 10)[-1]
     mask, template = first.mask.copy(), first.template.copy()
+    mismatch = first.mismatch.copy()
     show(pipe, [WALL] * 10, start=10)
     assert np.array_equal(first.mask, mask)
     assert np.array_equal(first.template, template)
+    assert np.array_equal(first.mismatch, mismatch)
 
 
 def test_same_frames_lead_to_the_same_results():

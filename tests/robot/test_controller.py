@@ -32,6 +32,22 @@ def test_a_node_begins_disarmed_with_brakes_on() -> None:
     assert not operator.arm.velocities.any()
 
 
+def test_a_state_tells_when_its_motion_began_and_by_which_frame() -> None:
+    operator = Operator().ready()
+    assert (operator.state.frame, operator.state.began) == (None, None)
+    before = tick_of(operator.now)
+    operator.show(JOG, 1, 0.2)
+    state = operator.state
+    assert state.began is not None
+    assert before <= state.began <= before + 10, "with the first command of the showing"
+    first = operator.sequence - 5
+    assert state.frame == first
+    operator.show(JOG, 1, 0.2)
+    assert (operator.state.frame, operator.state.began) == (first, state.began)
+    operator.show(None, 1, 0.5)
+    assert (operator.state.frame, operator.state.began) == (None, None)
+
+
 def test_a_jog_runs_while_it_is_held_and_ends_smoothly() -> None:
     operator = Operator().ready()
     operator.show(JOG, 1, 0.5)

@@ -83,7 +83,10 @@ export class FrameSender {
         this.latencyMs = null;
     }
 
-    /** The server answered frame `seq`. Older ones were left out by it: the newest frame wins. */
+    /**
+     * The server answered frame `seq`. Older ones were left out by it: the newest frame wins.
+     * Returns what is known of its sending ({capturedMs, sentAt}), or null.
+     */
     answered(seq) {
         const frame = this.#inFlight.get(seq);
         if (!frame) return null;
@@ -98,7 +101,7 @@ export class FrameSender {
         const took = now - frame.capturedMs;
         this.latencyMs = this.latencyMs === null ? took : this.latencyMs * 0.8 + took * 0.2;
         if (this.#fresh !== null) this.#send();
-        return took;
+        return frame;
     }
 
     #captured(time) {

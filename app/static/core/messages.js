@@ -10,8 +10,10 @@ export const INITIAL_STATE = Object.freeze({
     frame: null, // newest `frame` message
     frameAt: -Infinity,
     detail: null, // newest masks, template and distances
+    detailFrame: null, // the frame that it is of
     detailAt: -Infinity,
     gesture: null, // newest `gesture` message
+    jog: null, // newest `jog` message: why nothing comes of what is held
     people: null, // newest `people` message
     gestures: [],
     gesturesState: "loading",
@@ -23,20 +25,25 @@ export const INITIAL_STATE = Object.freeze({
     stopping: "idle",
     speed: 1, // part of the ordinary speed
     fine: false,
+    glass: false, // whether the glass box is open
 });
 
 /** Changes of the store for `message`; null for messages that change nothing in it. */
 export function changesFor(message, state, now) {
     switch (message.type) {
         case "hello":
-            return { hello: message, robot: null, frame: null, detail: null, gesture: null };
+            return { hello: message, robot: null, frame: null, detail: null, gesture: null, jog: null };
         case "frame": {
             const changes = { frame: message, frameAt: now };
-            if (message.detail) Object.assign(changes, { detail: message.detail, detailAt: now });
+            if (message.detail) {
+                Object.assign(changes, { detail: message.detail, detailFrame: message, detailAt: now });
+            }
             return changes;
         }
         case "gesture":
             return { gesture: message };
+        case "jog":
+            return { jog: message };
         case "people":
             return { people: message };
         case "robot": {

@@ -15,6 +15,8 @@ export const CLIENT_MESSAGES = Object.freeze([
     "ask_control",
     "keep_control",
     "hand_over",
+    "jog",
+    "use_gallery",
 ]);
 
 /** Types of the text messages that the server sends. */
@@ -26,6 +28,7 @@ export const SERVER_MESSAGES = Object.freeze([
     "gallery",
     "people",
     "pong",
+    "jog",
     "error",
 ]);
 

@@ -35,6 +35,11 @@ export class ServerClock {
         return tick - this.#robotAhead - this.#quickest().ahead;
     }
 
+    /** When the server's clock showed `tick`, on performance.now(); null while that is not known. */
+    serverWhen(tick) {
+        return this.#answers.length ? tick - this.#quickest().ahead : null;
+    }
+
     #quickest() {
         return this.#answers.reduce((best, each) => (each.took < best.took ? each : best));
     }

@@ -26,12 +26,16 @@ export class SourceKeeper {
         this.#store.set({ cameras: await WebcamSource.list() });
     }
 
-    /** Start a source; kind is "camera", "synthetic" or "again" (what was tried last). */
+    /** Start a source; kind is "camera", "synthetic", "keys" or "again" (what was tried last). */
     async start({ kind, deviceId = "" }) {
         if (kind !== "again") this.#last = { kind, deviceId };
         const wanted = this.#last;
         this.stop();
         const run = this.#run;
+        if (wanted.kind === "keys") {
+            this.#store.set({ source: { state: "running", kind: "keys" } });
+            return;
+        }
         const synthetic = wanted.kind === "synthetic";
         const source = synthetic ? new SyntheticSource() : new WebcamSource(wanted.deviceId);
         this.#source = source;

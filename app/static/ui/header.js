@@ -31,12 +31,10 @@ export function driver(element, store) {
     });
 }
 
-/** Connection to the server, and how long an answer takes. */
+/** Connection to the server. */
 export function connection(element, store) {
     const icon = part(element, "icon");
     const words = part(element, "words");
-    const latency = part(element, "latency");
-    latency.title = texts.connection.latencyLabel;
 
     function draw(state) {
         const { state: name, retryAt } = state.connection;
@@ -45,12 +43,9 @@ export function connection(element, store) {
         const text = texts.connection[name] || "";
         const seconds = Math.max(1, Math.ceil(((retryAt || 0) - performance.now()) / 1000));
         setText(words, typeof text === "function" ? text(seconds) : text);
-        const ms = state.sender.latencyMs;
-        const shown = name === "open" && Number.isFinite(ms) && ms !== null;
-        setText(latency, shown ? texts.connection.latency(Math.round(ms)) : "");
     }
 
-    store.watch(["connection", "sender"], draw);
+    store.watch(["connection"], draw);
     setInterval(() => {
         if (store.state.connection.state === "waiting") draw(store.state);
     }, 500);

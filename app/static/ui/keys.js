@@ -4,12 +4,15 @@ import { isField, want } from "./dom.js";
 
 const LETTERS = { a: "toggle-arm", c: "toggle-control", f: "toggle-fine", w: "swap", "?": "help" };
 
+/** A slider goes on meaning its own by the arrow keys. */
+const takesArrows = (element) => Boolean(element && element.closest && element.closest("input"));
+
 /**
  * Space and Escape stop, whatever has the focus, unless somebody types in a field (Escape then
- * leaves the field). `closeSheet` closes what lies over the page and says whether there was
+ * leaves the field). `jog` is asked about every other key. `closeSheet` closes what lies over the page and says whether there was
  * something; where nothing can move, Escape does only that.
  */
-export function keys(root, { closeSheet, canMove }) {
+export function keys(root, { closeSheet, canMove, jog }) {
     let swallowed = false;
 
     function down(event, stopOnly = false) {
@@ -27,12 +30,15 @@ export function keys(root, { closeSheet, canMove }) {
             event.preventDefault(); // neither scrolls nor presses what has the focus
             swallowed = true;
             if (!event.repeat) want(root, "stop");
+        } else if (!stopOnly && !typing && !takesArrows(event.target) && jog.down(event)) {
+            event.preventDefault();
         } else if (!stopOnly && !typing && !event.repeat && LETTERS[event.key.toLowerCase()]) {
             want(root, LETTERS[event.key.toLowerCase()]);
         }
     }
 
     function up(event) {
+        jog.up(event);
         if (event.key === " " && swallowed) event.preventDefault();
         if (event.key === " ") swallowed = false;
     }

@@ -1,8 +1,7 @@
-// The operator's own picture, what was found in it, and where it comes from.
+// The operator's own picture with the hand that was found, and where it comes from.
 
 import { texts } from "../texts/en.js";
 import { bitmapFromBase64, button, el, icon, part, setText, want } from "./dom.js";
-import { number, percent } from "./words.js";
 
 const words = texts.operator;
 const STALE_MS = 600;
@@ -77,7 +76,7 @@ function choice(iconName, title, text, id, onclick) {
     );
 }
 
-/** The two ways to give the robot pictures; also used by the "start driving" sheet. */
+/** The ways to tell the robot what to do; also used by the "start driving" sheet. */
 export function sourceChoices(element, prefix) {
     return [
         choice("camera", words.useCamera, words.useCameraWords, `${prefix}-camera`, () =>
@@ -85,6 +84,9 @@ export function sourceChoices(element, prefix) {
         ),
         choice("hand", words.trySynthetic, words.trySyntheticWords, `${prefix}-synthetic`, () =>
             want(element, "source", { kind: "synthetic" }),
+        ),
+        choice("keys", words.useKeys, words.useKeysWords, `${prefix}-keys`, () =>
+            want(element, "source", { kind: "keys" }),
         ),
     ];
 }
@@ -114,31 +116,6 @@ function sourceProblem(element, code) {
     ];
 }
 
-function seenPanel(element) {
-    const template = el("canvas", {
-        class: "template",
-        id: "template",
-        width: 60,
-        height: 80,
-        role: "img",
-        "aria-label": words.templateLabel,
-    });
-    const fact = (name, label) => {
-        const value = el("dd", { id: `seen-${name}`, text: "–" });
-        return [value, el("div", { data: { fact: name } }, el("dt", { text: label }), value)];
-    };
-    const [found, foundRow] = fact("match", words.found);
-    const [motion, motionRow] = fact("motion", words.motion);
-    const [rate, rateRow] = fact("rate", words.rate);
-    const [answer, answerRow] = fact("answer", words.answer);
-    const [mask, maskRow] = fact("mask", words.mask);
-    element.append(
-        el("figure", {}, template, el("figcaption", { text: words.template })),
-        el("dl", { class: "facts" }, foundRow, motionRow, rateRow, answerRow, maskRow),
-    );
-    return { template, found, motion, rate, answer, mask };
-}
-
 /** Fills the operator's card; returns the <video> that sources play in. */
 export function operatorView(element, store) {
     const video = part(element, "video");
@@ -148,8 +125,6 @@ export function operatorView(element, store) {
     const choices = part(element, "choices");
     const cameras = part(element, "cameras");
     const overlay = new Overlay(part(element, "overlay"));
-    const panel = seenPanel(part(element, "seen"));
-    const templateContext = panel.template.getContext("2d");
     glass.setAttribute("role", "img");
     glass.setAttribute("aria-label", words.previewLabel);
     setText(badge, words.demonstration);
@@ -218,12 +193,6 @@ export function operatorView(element, store) {
         decoding = true;
         const mask = detail.mask ? await bitmapFromBase64(detail.mask) : null;
         overlay.setMask(mask, colour("--overlay-mask"));
-        const template = detail.template ? await bitmapFromBase64(detail.template) : null;
-        templateContext.clearRect(0, 0, 60, 80);
-        if (template) {
-            templateContext.drawImage(template, 0, 0, 60, 80);
-            template.close();
-        }
         decoding = false;
     }
 
@@ -232,33 +201,17 @@ export function operatorView(element, store) {
         if (state.detail) drawDetail(state.detail);
     });
 
-    function drawFacts() {
+    function drawCaption() {
         const state = store.state;
         const running = state.source.state === "running";
-        const frame = running && performance.now() - state.frameAt < STALE_MS ? state.frame : null;
-        if (!frame) drawFrame(state);
-        const match = frame && frame.match;
-        setText(
-            panel.found,
-            match && match.gesture
-                ? `${match.gesture}, ${number(match.distance, 2)}`
-                : frame ? words.nothing : "–",
-        );
-        const way = frame && frame.mask;
-        setText(panel.mask, way ? words.maskValue(words.maskWays[way.mode] || way.mode, way.why) : "–");
-        const motion = frame && Number.isFinite(frame.motion) ? percent(frame.motion) : null;
-        const motionWords = frame && frame.still ? words.motionStill : words.motionMoving;
-        setText(panel.motion, motion && frame.motion !== null ? motionWords(motion) : "–");
-        setText(panel.rate, running ? words.rateValue(state.sender.rate) : "–");
-        const ms = state.sender.latencyMs;
-        setText(panel.answer, running && ms ? texts.connection.latency(number(ms, 0)) : "–");
+        if (performance.now() - state.frameAt >= STALE_MS) drawFrame(state);
         const clip = state.source.kind === "synthetic" && running;
         const shown = state.clipGesture;
         caption.hidden = !clip || shown === undefined;
         setText(caption, shown ? words.shows(shown) : words.showsNothing);
         badge.hidden = !clip;
     }
-    setInterval(drawFacts, 200);
-    store.watch(["source", "clipGesture"], drawFacts);
+    setInterval(drawCaption, 200);
+    store.watch(["source", "clipGesture"], drawCaption);
     return video;
 }

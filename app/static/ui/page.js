@@ -43,10 +43,15 @@ export function isObserver(state) {
     return Boolean(state.hello && state.hello.role === "observer");
 }
 
+/** Whether pictures of a hand come: a camera or the clip runs. */
+export function showsHand({ source }) {
+    return source.state === "running" && source.kind !== "keys";
+}
+
 /** Keep the root element's classes in step with the store. */
 export function keepRootClasses(root, store) {
     let mode = "mode-unknown";
-    store.watch(["connection", "hello", "robot", "source", "stopping"], (state) => {
+    store.watch(["connection", "hello", "robot", "source", "stopping", "glass"], (state) => {
         const now = `mode-${modeOf(state)}`;
         if (now !== mode) root.classList.replace(mode, now);
         mode = now;
@@ -55,6 +60,7 @@ export function keepRootClasses(root, store) {
         root.classList.toggle("is-observer", isObserver(state));
         root.classList.toggle("is-armed", Boolean(state.robot && state.robot.armed));
         root.classList.toggle("has-source", state.source.state === "running");
+        root.classList.toggle("has-glass", state.glass && showsHand(state));
         root.classList.toggle("is-stopping", state.stopping === "sending");
     });
 }

@@ -29,6 +29,14 @@ function whileStanding(state, gesture) {
     return over ? words.done(gesture) : words.seen(gesture);
 }
 
+const byKeys = (state) => state.source.kind === "keys";
+
+/** What the arm does not do by keys, and why not. */
+function whileStandingByKeys(state) {
+    const why = state.jog && state.jog.reason;
+    return why ? asSentence(why) : words.readyKeys;
+}
+
 function whileDriving(state, now) {
     const { robot, frame } = state;
     if (state.source.state === "starting") return words.sourceStarting;
@@ -41,6 +49,7 @@ function whileDriving(state, now) {
         return (gesture ? words.movingHold(gesture, what) : words.moving(what)) + tail;
     }
     if (robot.limits && robot.limits.length) return words.limits(robot.limits.join(", "));
+    if (byKeys(state)) return whileStandingByKeys(state);
     if (!frame) return words.waitingPicture;
     if (now - state.frameAt > STALE_FRAME_MS) return words.noFrames;
     if (gesture) return whileStanding(state, gesture);
@@ -72,10 +81,16 @@ export function sentenceFor(state, now) {
     if (!robot.armed) {
         if (why && state.wasArmed) return words.disarmedWhy(why);
         const gesture = seen(state);
+        if (byKeys(state)) return words.disarmedKeys;
         return gesture ? words.seenIdle(gesture, words.disarmed) : words.disarmed;
     }
     if (mode === "holding" && words.doubts[robot.doubt]) {
-        return `${words.holding(words.doubts[robot.doubt])} ${words.holdingNext}`;
+        const next = byKeys(state) ? words.holdingKeys : words.holdingNext;
+        return `${words.holding(words.doubts[robot.doubt])} ${next}`;
+    }
+    if (mode === "holding" && byKeys(state)) {
+        // The robot's own words for how to go on are about gestures.
+        return `${words.holding(/gesture/.test(why) ? "" : why)} ${words.holdingKeys}`;
     }
     if (mode === "holding") {
         // Some reasons say themselves how to go on.
@@ -113,7 +128,7 @@ export function sentence(element, spoken, store) {
         }
     }
 
-    const keys = ["connection", "hello", "robot", "source", "gesture", "frame", "description"];
+    const keys = ["connection", "hello", "robot", "source", "gesture", "frame", "description", "jog"];
     store.watch(keys, () => {
         if (!timer) draw();
     });

@@ -1,0 +1,88 @@
+"""Gestures into the tables, within a transaction."""
+
+from collections.abc import Sequence
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from app.errors import Duplicate, Invalid
+from app.gestures.reading import read_gesture
+from app.gestures.records import MAX_GESTURES, Gesture, NewGesture, name_key
+from app.gestures.rows import append, new_id, now_ms, seal_gesture
+from app.gestures.tables import GalleryRow, GestureRow
+from app.gestures.transactions import Transactions
+from app.gestures.versions import set_action
+
+
+def put(
+    base: Transactions,
+    session: Session,
+    home: GalleryRow,
+    entries: Sequence[NewGesture],
+    *,
+    replace: bool,
+) -> list[Gesture]:
+    """Enrol gestures in a gallery; with ``replace`` over those of the same names.
+
+    Raises:
+        Duplicate: a name is taken, and ``replace`` is off.
+        Invalid: there would be too many gestures, or samples of one.
+    """
+    rows = []
+    now = teaching_ms(home)
+    for entry in entries:
+        row = session.scalar(
+            select(GestureRow).where(
+                GestureRow.gallery == home.number, GestureRow.name_key == name_key(entry.name)
+            )
+        )
+        if row is None:
+            row = new_gesture(home, now)
+            session.add(row)
+        elif not replace:
+            check_free(session, home.number, entry.name)
+        row.name, row.name_key = entry.name, name_key(entry.name)
+        set_action(row, entry.action, now)
+        row.active = entry.active
+        row.samples.clear()
+        append(row, entry.templates, now)
+        row.updated_ms = now
+        seal_gesture(row)
+        session.flush()
+        rows.append(row)
+    count = session.scalar(
+        select(func.count()).select_from(GestureRow).where(GestureRow.gallery == home.number)
+    )
+    if count is not None and count > MAX_GESTURES:
+        raise Invalid(f"there would be {count} gestures; at most {MAX_GESTURES} are allowed")
+    base.rise(session)
+    return [read_gesture(base, row) for row in rows]
+
+
+def new_gesture(home: GalleryRow, created_ms: int) -> GestureRow:
+    """A row of a gallery that has neither name, action nor samples yet."""
+    return GestureRow(
+        id=new_id(), gallery=home.number, created_ms=created_ms, version=0, samples=[], versions=[]
+    )
+
+
+def teaching_ms(home: GalleryRow) -> int:
+    """Now, and newer than the gallery even if the clock was set back."""
+    return max(now_ms(), home.created_ms + 1)
+
+
+def check_free(session: Session, gallery: int, name: str, besides: int | None = None) -> None:
+    """Refuse a name that another gesture of the gallery has; ``besides`` is the gesture's own.
+
+    Raises:
+        Duplicate: the name is taken, upper and lower case being the same.
+    """
+    found = session.execute(
+        select(GestureRow.number, GestureRow.name).where(
+            GestureRow.gallery == gallery, GestureRow.name_key == name_key(name)
+        )
+    ).first()
+    if found is not None and found.number != besides:
+        raise Duplicate(
+            f"there is a gesture {found.name!r} already; choose another name", name=found.name
+        )
