@@ -32,7 +32,7 @@ def newcomer(server: Server, open_page: OpenPage, **options: Any) -> Page:
 
 
 def at(page: Page, step: str) -> None:
-    page.wait_for_selector(f"#sheet-first[data-step={step}]", timeout=SLOW)
+    page.wait_for_selector(f"#sheet-first[data-step={step}]", timeout=3 * SLOW)
 
 
 def begin(page: Page, name: str) -> None:

@@ -61,6 +61,8 @@ export function driveStep({ store, templateUrl, note, progress, keep, done }) {
 
     /** The gesture that moved the arm long enough to be seen. */
     function seen(name) {
+        // The drawn hand shows each gesture for a second only.
+        if (store.state.source.kind === "synthetic") return name;
         if (name && name !== mover) {
             mover = name;
             moving.reset();
