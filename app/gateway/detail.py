@@ -118,12 +118,13 @@ def _nearest(result: FrameResult, enrolled: Enrolled) -> list[dict[str, Any]]:
     if result.look is None:
         return []
     distances = result.look.distances
+    ids = enrolled.ids
     found = []
     for i in np.argsort(distances, kind="stable")[:NEAREST]:
         gesture, sample = enrolled.matcher.templates[i]
         found.append(
             {
-                "id": enrolled.ids.get(gesture),
+                "id": ids.get(gesture),
                 "gesture": gesture,
                 "sample": sample,
                 "distance": round(float(distances[i]), 4),

@@ -17,6 +17,7 @@ import { ServerClock } from "./core/server-clock.js";
 import { Stopper } from "./core/stopper.js";
 import { Store } from "./core/store.js";
 import { texts } from "./texts/en.js";
+import { setText } from "./ui/dom.js";
 import { dockButtons, steps, stopButton } from "./ui/dock.js";
 import { gestureList } from "./ui/gesture-list.js";
 import { glassFold } from "./ui/glass-fold.js";
@@ -130,6 +131,7 @@ async function loadJog() {
 
 store.watch(["connection", "hello", "robot", "source"], (state) => {
     byId("jog").hidden = !byKeys();
+    setText(byId("operator-title"), byKeys() ? texts.jog.title : texts.headings.operator);
     if (byKeys() && !jogAsked) loadJog();
     if (byKeys() && isDriving(state)) held.start();
     else held.stop();

@@ -67,6 +67,8 @@ def test_the_arm_moves_while_a_key_or_a_button_or_a_stick_is_held(
     page.click("#choose-keys")
     expect(page.locator("#jog [data-move=forward]")).to_be_visible(timeout=SLOW)
 
+    expect(page.locator("#operator-title")).to_have_text("Keys")
+
     # Nothing is armed by a key that is held.
     page.click("#btn-control")
     wait_for(page, "window.farhand.robot.controller === window.farhand.hello.session")
