@@ -43,6 +43,10 @@ class Standstill(NamedTuple):
     """From the fault to the same state; 0 when it stood before."""
     at: int
     """Tick of that state."""
+    since_obeyed_ms: float | None
+    """From the tick of the last command that the node itself obeyed, by when it held for want of
+    the next; None where it came to rest for another reason. Shorter than the first of these: the
+    one that watches missed a command or two."""
 
 
 class Observer:
@@ -126,7 +130,17 @@ class Observer:
             for arrived, command in self.commands
             if arrived <= until and arrived - command.tick <= COMMAND_TTL_MS
         ]
-        return Standstill(at - max(heard, default=fault), max(0.0, at - fault), at)
+        lapsed = [
+            step.tick
+            for step in seen[last + 1].transitions
+            if step.tick > fault and (step.reason or "").startswith("no command in time")
+        ]
+        return Standstill(
+            at - max(heard, default=fault),
+            max(0.0, at - fault),
+            at,
+            at - (lapsed[0] - COMMAND_TTL_MS) if lapsed else None,
+        )
 
     def moved_between(self, begin: int, end: int) -> bool:
         """Whether the arm moved after ``begin``, up to ``end``."""

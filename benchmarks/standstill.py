@@ -221,17 +221,20 @@ def measure(name: str, runs: int) -> dict[str, float | str]:
                 continue
             newest = outcomes[-1]
             print(
-                f"{name} {len(outcomes)}: {newest.standstill.since_command_ms:.0f} ms"
+                f"{name} {len(outcomes)}: {newest.standstill.since_command_ms:.0f} ms, "
+                f"by the node {newest.standstill.since_obeyed_ms or float('nan'):.0f} ms"
                 f"{', moved again' if newest.moved_again else ''}",
                 flush=True,
             )
     took = [each.standstill.since_command_ms for each in outcomes]
+    by_node = [each.standstill.since_obeyed_ms for each in outcomes]
     again = sum(each.moved_again for each in outcomes)
     return {
         **{
             f"{key} ms" if key != "n" else "runs": value for key, value in percentiles(took).items()
         },
         "from the fault, max ms": max(each.standstill.since_fault_ms for each in outcomes),
+        "by the node's own account, max ms": max((ms for ms in by_node if ms), default=0.0),
         "moved again": again,
         "repeated": repeated,
         **promise(

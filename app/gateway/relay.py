@@ -24,6 +24,9 @@ DEFAULT_CAMERAS = ("wrist", "scene")
 LINGER_S = 1.0
 """A watch lives on this long without viewers, so that polling single pictures stays quick."""
 RETRY_S = 0.25
+AT_ONCE = 8
+"""Viewers that are woken in one turn of the event loop. A hundred at once would keep the driver's
+next frame waiting until each has been sent its picture."""
 
 
 class NoPicture(WorldError):
@@ -46,10 +49,13 @@ class Viewer:
         self.dropped = 0
 
     def put(self, picture: bytes) -> None:
-        """Offer a picture; one that still waits is lost."""
+        """Offer a picture; one that still waits is lost. To be followed by :meth:`wake`."""
         if self._picture is not None:
             self.dropped += 1
         self._picture = picture
+
+    def wake(self) -> None:
+        """Let who waits for a picture have it."""
         self._ready.set()
 
     async def next(self) -> bytes:
@@ -202,5 +208,13 @@ class Relay:
     def _share(self, camera: _Camera, picture: bytes) -> None:
         if self._on_picture is not None:
             self._on_picture(camera.name)
-        for viewer in camera.viewers:
+        viewers = tuple(camera.viewers)
+        for viewer in viewers:
             viewer.put(picture)
+        self._wake(viewers)
+
+    def _wake(self, viewers: tuple[Viewer, ...]) -> None:
+        for viewer in viewers[:AT_ONCE]:
+            viewer.wake()
+        if len(viewers) > AT_ONCE:
+            asyncio.get_running_loop().call_soon(self._wake, viewers[AT_ONCE:])

@@ -14,6 +14,7 @@ import numpy as np
 
 from app.pipeline.network import load
 from app.pipeline.palm import MIN_CONTACT, arm_side
+from app.pipeline.regrow import regrow
 from app.pipeline.types import F32, U8, Box, Side
 
 MODEL = "hand_mask.onnx"
@@ -230,7 +231,7 @@ class LearnedMask:
         if seen.ndim == 2:
             seen = cv2.cvtColor(seen, cv2.COLOR_GRAY2BGR)
         share: F32 = self._session.run(None, {"input": seen})[0]
-        return share
+        return regrow(share, np.asarray(seen, np.uint8), THRESHOLD)
 
     def _spread(self, share: F32, bounds: Box) -> Masked:
         """The share at the picture's own resolution, thresholded."""

@@ -225,3 +225,29 @@ async def test_a_watch_that_fails_is_tried_again(monkeypatch: pytest.MonkeyPatch
     relay = Relay(robot)  # type: ignore[arg-type]
     assert await relay.picture("wrist", 5) == b"jpeg"
     await relay.close()
+
+
+async def test_a_crowd_of_viewers_leaves_room_for_others_between() -> None:
+    robot = Robot()
+    robot.may_close.set()
+    relay = Relay(robot)  # type: ignore[arg-type]
+    log: list[str] = []
+
+    async def look() -> None:
+        async with relay.view("wrist") as viewer:
+            await viewer.next()
+            log.append("picture")
+
+    async def turn() -> None:
+        while log.count("picture") < 50:
+            log.append("turn")
+            await asyncio.sleep(0)
+
+    async with asyncio.timeout(20), asyncio.TaskGroup() as group:
+        for _ in range(50):
+            group.create_task(look())
+        group.create_task(turn())
+    served = [len(run) for run in "".join(entry[0] for entry in log).split("t")]
+    assert sum(served) == 50
+    assert max(served) <= module.AT_ONCE
+    await relay.close()

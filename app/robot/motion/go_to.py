@@ -44,15 +44,22 @@ class GoClear:
         target: Inside the limits.
         name: What the target is called.
         search: Begins a search from the given joints.
+        nearest: Says in plain words what is too near with the joints at a target.
         patience: s; the longest search.
     """
 
     def __init__(
-        self, target: Vector, name: str, search: Callable[[Vector, Vector], Search], patience: float
+        self,
+        target: Vector,
+        name: str,
+        search: Callable[[Vector, Vector], Search],
+        nearest: Callable[[Vector], str | None],
+        patience: float,
     ) -> None:
         self._target = target
         self._name = name
         self._begin = search
+        self._nearest = nearest
         self._search: Search | None = None
         self._left = patience
         self._way: list[Vector] = []
@@ -89,7 +96,8 @@ class GoClear:
                 next(self._search)
         except StopIteration as ended:
             if ended.value is None:
-                text = f"{self._name} is too near to something now"
+                what = self._nearest(self._target)
+                text = f"{self._name} is too near to something now: {what}"
                 raise Refused(AtWork(text, "collision")) from None
             self._way = ended.value
             self.limits = (AtWork("goes round things", "note"),) if len(self._way) > 1 else ()

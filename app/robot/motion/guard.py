@@ -155,6 +155,16 @@ class Guard:
             [self._unseen - extra, *(each.distance - self._needed(each, extra) for each in margins)]
         )
 
+    def nearest_at(self, joints: Vector) -> str | None:
+        """What is nearest to its stop distance with the joints at ``joints`` (rad, shape (n,)).
+
+        In plain words; None when nothing is near.
+        """
+        margins = self.margins(joints)
+        if not margins:
+            return None
+        return self._tell(min(margins, key=lambda each: each.distance - self._needed(each)))
+
     @property
     def _unseen(self) -> float:
         """How far (m) what is not within slowing distance is from where it stops the arm."""

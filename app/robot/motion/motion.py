@@ -253,7 +253,8 @@ class Motion:
         joints = np.array(target, dtype=float)
         if not self.guard.active:
             return GoTo(joints)
-        return GoClear(joints, f"the pose {name}", self._search, self._settings.planning_s)
+        blocked = self.guard.nearest_at
+        return GoClear(joints, f"the pose {name}", self._search, blocked, self._settings.planning_s)
 
     def _search(self, start: Vector, goal: Vector) -> Search:
         guard, limits = self.guard, self.trajectory.limits

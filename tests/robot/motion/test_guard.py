@@ -286,7 +286,9 @@ def test_a_pose_that_something_stands_in_is_refused_and_the_arm_stands(
     )
     rig.motion.begin(Pose(name="right"))
     rig.finish(2.0)
-    assert rig.motion.limits == ("the pose right is too near to something now",)
+    (told,) = rig.motion.limits
+    assert told.startswith("the pose right is too near to something now: ")
+    assert told.endswith(" mm from the blue cylinder")
     assert np.array_equal(rig.arm.joints, rig.arm.home)
 
 
