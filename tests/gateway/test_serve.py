@@ -26,9 +26,10 @@ from app.config import Settings
 from app.errors import CannotStart
 from app.gateway.auth import is_loopback
 from app.gateway.greeting import address, greet, link
-from app.gateway.serve import bind, check_transport, keep_certificate, local_authority
+from app.gateway.serve import bind
 from app.gateway.tls import FOLDER, read_authority
 from app.gateway.tokens import TokenStore
+from app.gateway.transport import check_transport, keep_certificate, local_authority
 from tests.gateway.running import TOKEN, StandIn, running, settings_for, wait_for
 
 SCRIPT = """
@@ -287,7 +288,7 @@ async def test_a_given_certificate_that_changes_is_read_again(
     certificate: tuple[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     cert, key = (Path(shutil.copy(path, tmp_path)) for path in certificate)
-    monkeypatch.setattr("app.gateway.serve.CERTIFICATE_CHECK_S", 0.01)
+    monkeypatch.setattr("app.gateway.transport.CERTIFICATE_CHECK_S", 0.01)
     loaded = []
 
     class Context(ssl.SSLContext):
