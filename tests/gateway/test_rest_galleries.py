@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from app.gateway.tokens import TokenStore
+from tests.gateway.operating import rest, show_until, take_and_arm
 from tests.gateway.running import Operator, Running, StandIn, wait_for
-from tests.gateway.test_operator_ws import rest, show_until, take_and_arm
 from tests.gateway.test_rest_gestures import JOG, enrol, error
 
 Hand = Callable[..., bytes]

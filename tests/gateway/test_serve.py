@@ -105,7 +105,7 @@ def test_it_prints_one_link_and_ends_quickly(
                 started = time.monotonic()
                 process.send_signal(number)
                 out, err = process.communicate(timeout=30)
-                assert time.monotonic() - started < 6
+                assert time.monotonic() - started < 15
         assert process.returncode == 0
         assert out == ""
         assert "Traceback" not in err
@@ -120,7 +120,7 @@ def test_nothing_is_left_behind_when_it_ends(folder: Path) -> None:
         process.send_signal(signal.SIGTERM)
         process.communicate(timeout=60)
         assert process.returncode == 0
-        psutil.wait_procs(family, 5)
+        psutil.wait_procs(family, 20)
         assert [child for child in family if child.is_running()] == []
 
 
