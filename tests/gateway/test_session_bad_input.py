@@ -13,6 +13,12 @@ from tests.gateway.operating import Hand
 from tests.gateway.running import Operator, Running
 
 
+@pytest.fixture
+def server(lasting: Running) -> Running:
+    """One for all: what is refused leaves nothing behind."""
+    return lasting
+
+
 def progressive() -> bytes:
     picture = np.zeros((240, 320, 3), np.uint8)
     done, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_PROGRESSIVE, 1])
