@@ -16,8 +16,8 @@ from app.gateway.roles import FRAME, Role, may_send
 from app.link.header import HEADER_SIZE, FrameHeader
 from app.pipeline.decode import read_header
 
-Situate = Callable[[float, str | None], Situation]
-"""The situation now (s, monotonic), of a frame that is too old for this reason."""
+Situate = Callable[[Enrolled, float, str | None], Situation]
+"""With this gallery, now (s, monotonic), of a frame that is too old for this reason or is not."""
 
 
 class FrameSlot:
@@ -87,14 +87,15 @@ class FrameSlot:
         detail = self.detail and now >= self._next_detail
         if detail:
             self._next_detail = now + self._detail_s
+        enrolled = self._enrolled()
         stale = self._age(header.tick, header.captured_ms, tick_ms())
         self._job = FrameJob(
             seq=seq,
             jpeg=jpeg,
             arrived=now,
             arrival=arrival,
-            situation=self._situate(now, stale),
-            enrolled=self._enrolled(),
+            situation=self._situate(enrolled, now, stale),
+            enrolled=enrolled,
             detail=detail,
             glass=self.glass,
         )

@@ -17,6 +17,7 @@ from app.gateway.eyes import PictureAge
 from app.gateway.frame_job import FrameWorker
 from app.gateway.frame_slot import FrameSlot
 from app.gateway.frame_work import FrameWork
+from app.gateway.gallery import Enrolled
 from app.gateway.gallery_choice import GalleryChoice
 from app.gateway.held_keys import HeldKeys
 from app.gateway.lease_keeper import LeaseKeeper
@@ -212,10 +213,12 @@ class OperatorSession:
     def _silent_s(self) -> float:
         return time.monotonic() - self._heard_at
 
-    def _situation(self, now: float, stale: str | None, *, by_keys: bool = False) -> Situation:
+    def _situation(
+        self, enrolled: Enrolled, now: float, stale: str | None, *, by_keys: bool = False
+    ) -> Situation:
         state = self._hub.robot.live_state
         return Situation(
-            actions=self._gallery.enrolled.actions,
+            actions=enrolled.actions,
             lease=self._leases.lease,
             state=state,
             stale=stale,
@@ -225,8 +228,11 @@ class OperatorSession:
             by_keys=by_keys,
         )
 
-    def _situation_of_frame(self, now: float, stale: str | None) -> Situation:
-        return self._situation(now, stale, by_keys=self._keys.drive(now))
+    def _situation_of_frame(self, enrolled: Enrolled, now: float, stale: str | None) -> Situation:
+        return self._situation(enrolled, now, stale, by_keys=self._keys.drive(now))
+
+    def _situation_of_key(self, now: float, stale: str | None) -> Situation:
+        return self._situation(self._gallery.enrolled, now, stale)
 
     def _take_text(self, text: str) -> None:
         message = parse_client_message(text)
@@ -241,7 +247,7 @@ class OperatorSession:
             case Speed():
                 self._scale = message.scale
             case Jog():
-                self._keys.take(message, self._situation)
+                self._keys.take(message, self._situation_of_key)
             case Picture():
                 self._pictures.saw(message.camera, message.tick)
             case TakeControl() | HandOver() | UseGallery():

@@ -38,7 +38,8 @@ class Slot(FrameSlot):
         self.metrics = Metrics()
         super().__init__(role, SETTINGS, self.metrics, lambda: ENROLLED, self.situate)
 
-    def situate(self, now: float, stale: str | None) -> Situation:
+    def situate(self, enrolled: Enrolled, now: float, stale: str | None) -> Situation:
+        assert enrolled is ENROLLED
         return Situation({}, None, None, stale=stale, at=now)
 
     def counted(self, result: str) -> float:
