@@ -3,7 +3,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
 SETUP := .venv/.set-up
 
-.PHONY: run test check format types borders lock wheel clean help
+.PHONY: run test check lint types borders format lock wheel clean help
 
 help:            ## say what there is
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/ \t/'
@@ -11,13 +11,20 @@ help:            ## say what there is
 run: $(SETUP)    ## start the server and a robot; prints the link to open
 	$(BIN)/python -m app serve --data-dir .farhand $(ARGS)
 
-test: $(SETUP)   ## run all tests, two at once
-	$(BIN)/python -m pytest -n 2 $(ARGS)
+# A worker that tests in real time, and two that compute while it waits; see tests/scheduling.py.
+test: $(SETUP)   ## run all tests, three at once
+	$(BIN)/python -m pytest -n 3 $(ARGS)
 
-check: $(SETUP)  ## linters, types and import borders
+check: lint types borders ## linters, types and import borders
+
+lint: $(SETUP)
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
+
+types: $(SETUP)
 	$(BIN)/mypy
+
+borders: $(SETUP)
 	$(BIN)/lint-imports
 
 format: $(SETUP) ## put the code into its form

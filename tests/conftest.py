@@ -1,4 +1,4 @@
-"""Which tests may run beside one another, and a disk that can be filled."""
+"""How the tests are handed out to several workers, and a disk that can be filled."""
 
 import subprocess
 from collections.abc import Iterator
@@ -6,33 +6,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from xdist.scheduler import LoadScopeScheduling
 
-LIVE = (
-    "e2e",
-    "gateway/test_real_robot.py",
-    "gateway/test_serve.py",
-    "robot/test_camera.py",
-    "robot/test_dry_run.py",
-    "robot/test_node.py",
-    "test_cli.py",
-    "test_doctor.py",
-    "test_faults.py",
-)
-"""Browsers, servers and nodes that run in real time: one after another, so that no two of them
-share a machine of two cores."""
+from tests.scheduling import Apart, give_way
 
 
-class _Apart(LoadScopeScheduling):
-    def _split_scope(self, nodeid: str) -> str:
-        name = nodeid.partition("::")[0].removeprefix("tests/")
-        live = name in LIVE or name.partition("/")[0] in LIVE
-        # Other files each stay whole, for what their tests share.
-        return "live" if live else name
+def pytest_configure(config: pytest.Config) -> None:
+    give_way(config)
 
 
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:
-    return _Apart(config, log)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Apart:
+    return Apart(config, log)
 
 
 @pytest.fixture

@@ -8,7 +8,6 @@ import logging
 import logging.config
 import signal
 import socket
-import ssl
 import sys
 from collections.abc import Callable, Iterator
 from types import FrameType
@@ -22,13 +21,11 @@ from fastapi import FastAPI
 from app.config import Settings
 from app.errors import CannotStart
 from app.gateway.app import create_app
-from app.gateway.auth import is_loopback
 from app.gateway.front import SecureFront
 from app.gateway.greeting import greet
-from app.gateway.machine import machine_names
-from app.gateway.roles import ROUTES
-from app.gateway.tls import FOLDER, LocalAuthority
+from app.gateway.tls import LocalAuthority
 from app.gateway.tokens import TokenStore
+from app.gateway.transport import check_transport, keep_certificate, local_authority
 
 log = logging.getLogger(__name__)
 
@@ -39,7 +36,6 @@ limit, so that a message over that is still read and the connection closed with 
 closing while the rest of it arrives would reset the connection and lose the code."""
 GRACE_S = 1
 UNSENT_BYTES = 128 * 1024
-CERTIFICATE_CHECK_S = 60.0
 
 LOG_CONFIG: dict[str, Any] = {
     "version": 1,
@@ -101,45 +97,6 @@ def bind(settings: Settings) -> socket.socket:
         raise CannotStart(what, host=host, port=port) from error
     listener.setblocking(False)
     return listener
-
-
-def check_transport(settings: Settings) -> None:
-    """Refuse half or broken certificates, and settings of a proxy without a proxy.
-
-    Raises:
-        CannotStart: with what to give instead.
-    """
-    cert, key = settings.tls_cert, settings.tls_key
-    if (cert is None) != (key is None):
-        raise CannotStart("HTTPS needs both --tls-cert and --tls-key")
-    if settings.root_path and not settings.behind_proxy:
-        raise CannotStart("--root-path is for a server behind a proxy: give --behind-proxy, too")
-    first = settings.root_path.strip("/").partition("/")[0]
-    if first and any(path.split("/")[1] == first for path in (k.split(" ")[1] for k in ROUTES)):
-        raise CannotStart(f"--root-path may not begin with /{first}, which Farhand uses itself")
-    if cert is None:
-        return
-    assert key is not None
-    try:
-        ssl.create_default_context(ssl.Purpose.CLIENT_AUTH).load_cert_chain(cert, key)
-    except (OSError, ssl.SSLError) as error:
-        raise CannotStart(
-            f"the certificate {cert} with the key {key} cannot be used: {error}"
-        ) from error
-
-
-def local_authority(settings: Settings) -> LocalAuthority | None:
-    """What makes the certificates of a server that other machines reach and that has none.
-
-    Raises:
-        CannotStart: its folder is open to others, or cannot be read or written.
-    """
-    if settings.tls_cert is not None or settings.behind_proxy or is_loopback(settings.host):
-        return None
-    more = (settings.host, *settings.gateway.allowed_hosts)
-    authority = LocalAuthority(settings.data_dir / FOLDER, lambda: machine_names(more))
-    authority.prepare()
-    return authority
 
 
 class Server(uvicorn.Server):
@@ -206,37 +163,6 @@ def make_server(
         ssl_keyfile=key,
     )
     return Server(config, app)
-
-
-async def keep_certificate(
-    context: ssl.SSLContext, settings: Settings, authority: LocalAuthority | None
-) -> None:
-    """Renew the certificate, or read again the one that was given, for ever.
-
-    Connections that are open keep theirs; new ones get the new one.
-    """
-    seen = _stamp(settings)
-    while True:
-        await asyncio.sleep(CERTIFICATE_CHECK_S)
-        try:
-            if authority is not None:
-                if await asyncio.to_thread(authority.prepare):
-                    context.load_cert_chain(authority.server_file)
-            elif settings.tls_cert is not None and (now := _stamp(settings)) != seen:
-                context.load_cert_chain(settings.tls_cert, settings.tls_key)
-                seen = now
-                log.info("read the certificate %s again", settings.tls_cert)
-        except (CannotStart, OSError, ssl.SSLError) as error:
-            log.error("the certificate stays as it is: %s", error)
-
-
-def _stamp(settings: Settings) -> tuple[int, ...]:
-    """Changes when the certificate that was given does."""
-    files = [path for path in (settings.tls_cert, settings.tls_key) if path is not None]
-    try:
-        return tuple(path.stat().st_mtime_ns for path in files)
-    except OSError:
-        return ()
 
 
 class Signals:

@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,10 @@ BASE_ARGUMENTS = [
     "--disable-sync",
     "--use-fake-device-for-media-stream",
 ]
+
+
+AT_HOME = 0.02
+"""rad; the brakes let the arm sink by less."""
 
 
 @dataclass
@@ -91,6 +96,38 @@ def stop_server(server: Server) -> None:
     finally:
         assert server.process.stdout is not None
         server.process.stdout.close()
+
+
+def put_at_rest(server: Server, seconds: float = 60.0) -> None:
+    """Bring a server's robot back to where it is after a start: disarmed, at home, nobody's.
+
+    For the next test on the same server. Moves no arm: a node whose arm is elsewhere is killed, and
+    the next one begins at home.
+
+    Raises:
+        TimeoutError: the robot did not get there.
+    """
+    deadline = time.monotonic() + seconds
+    with server.api() as api:
+
+        def until(what: str, so: Callable[[dict[str, Any]], object]) -> dict[str, Any]:
+            while not so(robot := api.get("/api/robots/puma").json()):
+                if time.monotonic() > deadline:
+                    raise TimeoutError(f"not {what} within {seconds:g} s: {robot}")
+                time.sleep(0.05)
+            return dict(robot)
+
+        until("free", lambda robot: robot["online"] and robot["controller"] is None)
+        # Refused while the arm still moves.
+        until("reset", lambda _: api.post("/api/robots/puma/reset").status_code == 200)
+        robot = until("described", lambda robot: robot["description"] and robot["state"])
+        home = robot["description"]["poses"]["home"]
+        here = robot["state"]["joints"]
+        if max(abs(a - b) for a, b in zip(here, home, strict=True)) > AT_HOME:
+            before = robot["restarts"]
+            server.node().kill()
+            until("back", lambda robot: robot["restarts"] > before and robot["online"])
+        until("disarmed", lambda robot: robot["mode"] == "disarmed" and robot["fault"] is None)
 
 
 def wait_for(page: Page, expression: str, seconds: float = 60.0) -> None:

@@ -4,6 +4,7 @@ import os
 import re
 import signal
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from playwright.sync_api import Page, expect
 from app.gateway.tokens import TokenStore
 from app.gestures.synthetic import Step, SyntheticOperator, write_mjpeg
 from tests.e2e.conftest import OpenPage
-from tests.e2e.running import TOKEN, Server, wait_for
+from tests.e2e.running import TOKEN, Server, put_at_rest, wait_for
 
 pytestmark = [pytest.mark.e2e, pytest.mark.timeout(300)]
 
@@ -21,9 +22,16 @@ SLOW = 60_000
 
 
 @pytest.fixture
-def showing_up(tmp_path: Path) -> Path:
+def server(one_server: Server) -> Iterator[Server]:
+    """The same for all, and as it was at the start for each."""
+    yield one_server
+    put_at_rest(one_server)
+
+
+@pytest.fixture(scope="module")
+def showing_up(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A webcam that shows ``up`` for two seconds, then no hand, over and over."""
-    path = tmp_path / "webcam.mjpeg"
+    path = tmp_path_factory.mktemp("webcam") / "webcam.mjpeg"
     write_mjpeg(SyntheticOperator((Step(None, 1.0), Step("up", 2.0))).frames(), path)
     return path
 

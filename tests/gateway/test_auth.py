@@ -326,16 +326,16 @@ def test_a_link_on_another_site_needs_one_reload(server: Running) -> None:
         assert 'name="token"' not in page.text
 
 
-def test_a_foreign_host_is_refused(server: Running) -> None:
-    with anonymous(server, Host="evil.example", **BEARER) as client:
+def test_a_foreign_host_is_refused(lasting: Running) -> None:
+    with anonymous(lasting, Host="evil.example", **BEARER) as client:
         answer = client.get("/api/health")
         assert answer.status_code == 400
         assert answer.json()["error"]["code"] == "host_refused"
 
 
-def test_every_answer_has_the_security_headers(server: Running) -> None:
+def test_every_answer_has_the_security_headers(lasting: Running) -> None:
     for path in ("/", "/api/gestures", "/nothing", "/static/app.js", "/docs"):
-        answer = server.http.get(path)
+        answer = lasting.http.get(path)
         assert answer.headers["x-content-type-options"] == "nosniff"
         assert answer.headers["referrer-policy"] == "no-referrer"
         policy = answer.headers["content-security-policy"]
@@ -359,28 +359,28 @@ def test_every_answer_has_the_security_headers(server: Running) -> None:
     ],
 )
 def test_websockets_are_refused_before_they_open(
-    server: Running, path: str, sent: str, origin: str | None, status: int
+    lasting: Running, path: str, sent: str, origin: str | None, status: int
 ) -> None:
     values = {
         "nothing": {},
         "wrong bearer": {"Authorization": "Bearer wrong"},
-        "cookie": {"Cookie": cookie_of(server)},
+        "cookie": {"Cookie": cookie_of(lasting)},
     }[sent]
     with pytest.raises(InvalidStatus) as refused:
-        server.socket(path, additional_headers=values, origin=origin)
+        lasting.socket(path, additional_headers=values, origin=origin)
     assert refused.value.response.status_code == status
     assert b'"error"' in refused.value.response.body
 
 
-def test_a_cookie_with_our_origin_opens_a_websocket(server: Running) -> None:
-    cookie = {"Cookie": cookie_of(server)}
-    with server.operator(additional_headers=cookie, origin=server.url) as operator:
+def test_a_cookie_with_our_origin_opens_a_websocket(lasting: Running) -> None:
+    cookie = {"Cookie": cookie_of(lasting)}
+    with lasting.operator(additional_headers=cookie, origin=lasting.url) as operator:
         assert operator.hello["type"] == "hello"
 
 
-def test_a_websocket_for_a_foreign_host_is_refused(server: Running) -> None:
+def test_a_websocket_for_a_foreign_host_is_refused(lasting: Running) -> None:
     with (
-        socket.create_connection(("127.0.0.1", server.port)) as sock,
+        socket.create_connection(("127.0.0.1", lasting.port)) as sock,
         pytest.raises(InvalidStatus) as refused,
     ):
         connect("ws://evil.example/ws/operator", sock=sock, additional_headers=BEARER, proxy=None)

@@ -38,21 +38,21 @@ def blurred(image: bytes) -> bytes:
     return simplejpeg.encode_jpeg(np.ascontiguousarray(picture), 90, "BGR")
 
 
-def test_a_bad_shot_is_refused_with_its_reason(server: Running, hand: Hand) -> None:
-    before = names(server)
-    error = enrol(server, "wave", hand("up"), blurred(hand("up"))).json()["error"]
+def test_a_bad_shot_is_refused_with_its_reason(lasting: Running, hand: Hand) -> None:
+    before = names(lasting)
+    error = enrol(lasting, "wave", hand("up"), blurred(hand("up"))).json()["error"]
     assert error["code"] == "image_refused"
     assert error["message"].startswith("image 2: the picture is blurred")
     assert error["detail"] == {"problem": "blurred", "image": 2}
-    assert names(server) == before
+    assert names(lasting) == before
     # Asking what a blurred picture shows is not refused.
-    answer = server.http.post("/api/recognise", content=blurred(hand("up"))).json()
+    answer = lasting.http.post("/api/recognise", content=blurred(hand("up"))).json()
     assert "blurred" not in str(answer["reason"])
 
 
-def test_checking_judges_each_image_and_stores_nothing(server: Running, hand: Hand) -> None:
-    before = server.http.get("/api/gestures").json()
-    answer = check(server, hand("up"), blurred(hand("up")), hand(None), b"nothing", name="wave")
+def test_checking_judges_each_image_and_stores_nothing(lasting: Running, hand: Hand) -> None:
+    before = lasting.http.get("/api/gestures").json()
+    answer = check(lasting, hand("up"), blurred(hand("up")), hand(None), b"nothing", name="wave")
     assert answer.status_code == 200
     body = answer.json()
     assert [image["accepted"] for image in body["images"]] == [True, False, False, False]
@@ -65,7 +65,7 @@ def test_checking_judges_each_image_and_stores_nothing(server: Running, hand: Ha
     assert (worst["gesture"], worst["level"], worst["active"]) == ("up", "likely", True)
     assert worst["threshold"] == body["threshold"] > worst["distance"]
     assert {advice["code"] for advice in worst["advice"]} >= {"add_photos", "another_sign"}
-    assert server.http.get("/api/gestures").json() == before
+    assert lasting.http.get("/api/gestures").json() == before
 
 
 def test_more_samples_are_not_confused_with_their_own_gesture(server: Running, hand: Hand) -> None:
@@ -88,8 +88,10 @@ def test_more_samples_are_not_confused_with_their_own_gesture(server: Running, h
         ({"action": '{"type": "dance"}'}, "bad_action"),
     ],
 )
-def test_a_bad_field_is_422(server: Running, hand: Hand, fields: dict[str, str], code: str) -> None:
-    answer = check(server, hand("up"), **fields)
+def test_a_bad_field_is_422(
+    lasting: Running, hand: Hand, fields: dict[str, str], code: str
+) -> None:
+    answer = check(lasting, hand("up"), **fields)
     assert (answer.status_code, answer.json()["error"]["code"]) == (422, code)
 
 

@@ -127,7 +127,7 @@ def test_a_child_that_does_not_end_is_killed_with_all_it_started(tmp_path: Path)
     grandchild = int(path.read_text())
     started = time.monotonic()
     process.close()
-    assert time.monotonic() - started < 5
+    assert time.monotonic() - started < 20
     wait_for(lambda: not psutil.pid_exists(grandchild), "the grandchild to be gone")
 
 

@@ -97,9 +97,9 @@ def test_the_arm_rests_when_the_browser_goes(ready: Running, hand: Hand) -> None
         state = ready.hub.robot.state
         return max(map(abs, state.velocities)) < 0.005 and state.mode != "moving"
 
-    wait_for(standing, "standstill", 5)
+    wait_for(standing, "standstill", 15)
     assert time.monotonic() - gone < 1.0
-    wait_for(lambda: ready.hub.robot.state.controller is None, "the lease to be free", 5)
+    wait_for(lambda: ready.hub.robot.state.controller is None, "the lease to be free", 15)
     assert not ready.hub.robot.state.armed
 
 
@@ -175,7 +175,7 @@ def test_a_crash_is_told_within_a_moment_and_mended(ready: Running) -> None:
         assert ready.hub.robot.node_pid not in (None, pid)
         assert ready.hub.robot.restarts >= 1
         # Nothing that belonged to it is left behind.
-        psutil.wait_procs(children, 5)
+        psutil.wait_procs(children, 20)
         assert [child for child in children if child.is_running()] == []
 
 

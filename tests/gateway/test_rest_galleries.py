@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from app.gateway.tokens import TokenStore
+from tests.gateway.operating import rest, show_until, take_and_arm
 from tests.gateway.running import Operator, Running, StandIn, wait_for
-from tests.gateway.test_operator_ws import rest, show_until, take_and_arm
 from tests.gateway.test_rest_gestures import JOG, enrol, error
 
 Hand = Callable[..., bytes]
@@ -197,8 +197,8 @@ def test_a_hand_that_is_up_when_the_gallery_changes_moves_nothing(
 
 
 @pytest.mark.parametrize("gallery", [None, 5, "", "x" * 65])
-def test_a_bad_choice_is_refused(server: Running, gallery: object) -> None:
-    with server.operator() as operator:
+def test_a_bad_choice_is_refused(lasting: Running, gallery: object) -> None:
+    with lasting.operator() as operator:
         operator.send("use_gallery", gallery=gallery)
         assert operator.next("error")["code"] == "message_values"
 

@@ -38,8 +38,8 @@ def names(server: Running) -> list[str]:
     return [gesture["name"] for gesture in server.http.get("/api/gestures").json()]
 
 
-def test_the_starter_set_is_there(server: Running) -> None:
-    gestures = server.http.get("/api/gestures").json()
+def test_the_starter_set_is_there(lasting: Running) -> None:
+    gestures = lasting.http.get("/api/gestures").json()
     assert len(gestures) == 10
     forward = next(gesture for gesture in gestures if gesture["name"] == "forward")
     assert forward["action"] == {
@@ -49,7 +49,7 @@ def test_the_starter_set_is_there(server: Running) -> None:
         "angular": [0.0, 0.0, 0.0],
     }
     assert forward["samples"] == len(forward["sample_ids"]) == 2
-    assert server.http.get(f"/api/gestures/{forward['id']}").json() == forward
+    assert lasting.http.get(f"/api/gestures/{forward['id']}").json() == forward
 
 
 def test_one_image_enrols_a_gesture_that_is_recognised_at_once(server: Running, hand: Hand) -> None:
@@ -116,14 +116,14 @@ def test_a_duplicate_name_is_refused(server: Running, hand: Hand) -> None:
         ("GET", "/template.png"),
     ],
 )
-def test_an_unknown_id_is_404(server: Running, hand: Hand, method: str, path: str) -> None:
+def test_an_unknown_id_is_404(lasting: Running, hand: Hand, method: str, path: str) -> None:
     arguments: dict[str, Any] = {}
     if method == "PATCH":
         arguments["json"] = {"name": "x"}
     if method == "POST":
         arguments["files"] = [("images", hand("up"))]
     error(
-        server.http.request(method, f"/api/gestures/nothing{path}", **arguments), 404, "not_found"
+        lasting.http.request(method, f"/api/gestures/nothing{path}", **arguments), 404, "not_found"
     )
 
 
@@ -145,37 +145,37 @@ BAD_ACTIONS: dict[str, Any] = {
 
 
 @pytest.mark.parametrize("what", BAD_ACTIONS)
-def test_a_bad_action_is_422_and_enrols_nothing(server: Running, hand: Hand, what: str) -> None:
-    before = names(server)
-    answer = enrol(server, "wave", BAD_ACTIONS[what], hand("up"))
+def test_a_bad_action_is_422_and_enrols_nothing(lasting: Running, hand: Hand, what: str) -> None:
+    before = names(lasting)
+    answer = enrol(lasting, "wave", BAD_ACTIONS[what], hand("up"))
     assert answer.status_code == 422
     assert answer.json()["error"]["code"] in ("bad_action", "invalid")
-    assert names(server) == before
+    assert names(lasting) == before
 
 
 @pytest.mark.parametrize("name", ["", "   ", "x" * 61, "a\x00b", "tab\tname"])
-def test_a_bad_name_is_422(server: Running, hand: Hand, name: str) -> None:
-    error(enrol(server, name, JOG, hand("up")), 422, "invalid")
+def test_a_bad_name_is_422(lasting: Running, hand: Hand, name: str) -> None:
+    error(enrol(lasting, name, JOG, hand("up")), 422, "invalid")
 
 
-def test_an_image_without_a_hand_is_422_with_the_reason(server: Running, hand: Hand) -> None:
-    before = names(server)
-    message = error(enrol(server, "wave", JOG, hand(None)), 422, "image_refused")
+def test_an_image_without_a_hand_is_422_with_the_reason(lasting: Running, hand: Hand) -> None:
+    before = names(lasting)
+    message = error(enrol(lasting, "wave", JOG, hand(None)), 422, "image_refused")
     assert "no hand" in message
     # Whole or not at all: the good one before it is not kept either.
-    message = error(enrol(server, "wave", JOG, hand("up"), hand(None)), 422, "image_refused")
+    message = error(enrol(lasting, "wave", JOG, hand("up"), hand(None)), 422, "image_refused")
     assert message.startswith("image 2: ")
-    assert names(server) == before
+    assert names(lasting) == before
 
 
 @pytest.mark.parametrize("image", [b"", b"hello", b"\xff\xd8\xff\xe0" + bytes(200)])
-def test_what_is_no_image_is_422(server: Running, image: bytes) -> None:
-    assert enrol(server, "wave", JOG, image).status_code == 422
-    assert server.http.post("/api/recognise", content=image).status_code in (200, 422)
+def test_what_is_no_image_is_422(lasting: Running, image: bytes) -> None:
+    assert enrol(lasting, "wave", JOG, image).status_code == 422
+    assert lasting.http.post("/api/recognise", content=image).status_code in (200, 422)
 
 
-def test_fields_that_are_missing_or_wrong_are_422(server: Running, hand: Hand) -> None:
-    post = server.http.post
+def test_fields_that_are_missing_or_wrong_are_422(lasting: Running, hand: Hand) -> None:
+    post = lasting.http.post
     image = ("images", ("a.jpg", hand("up"), "image/jpeg"))
     home = '{"type": "home"}'
     error(post("/api/gestures", data={"action": home}, files=[image]), 422, "invalid")
@@ -194,8 +194,8 @@ def test_fields_that_are_missing_or_wrong_are_422(server: Running, hand: Hand) -
         422,
         "invalid",
     )
-    error(enrol(server, "x", JOG), 415, "unsupported_media_type")
-    error(enrol(server, "x", JOG, hand("up"), field="pictures"), 422, "invalid")
+    error(enrol(lasting, "x", JOG), 415, "unsupported_media_type")
+    error(enrol(lasting, "x", JOG, hand("up"), field="pictures"), 422, "invalid")
     error(post("/api/gestures", json={"name": "x"}), 415, "unsupported_media_type")
     error(
         post("/api/gestures", content=b"no parts", headers={"Content-Type": "multipart/form-data"}),
@@ -207,30 +207,30 @@ def test_fields_that_are_missing_or_wrong_are_422(server: Running, hand: Hand) -
 @pytest.mark.parametrize(
     "body", [b"", b"{", b"[]", b"{}", b'{"name": 5}', b'{"id": "x"}', b'{"name": NaN}', b'"x"']
 )
-def test_a_bad_change_is_422(server: Running, body: bytes) -> None:
-    id = server.http.get("/api/gestures").json()[0]["id"]
-    answer = server.http.patch(
+def test_a_bad_change_is_422(lasting: Running, body: bytes) -> None:
+    id = lasting.http.get("/api/gestures").json()[0]["id"]
+    answer = lasting.http.patch(
         f"/api/gestures/{id}", content=body, headers={"Content-Type": "application/json"}
     )
     error(answer, 422, "invalid")
-    error(server.http.patch(f"/api/gestures/{id}", content=b"{}"), 415, "unsupported_media_type")
+    error(lasting.http.patch(f"/api/gestures/{id}", content=b"{}"), 415, "unsupported_media_type")
 
 
-def test_over_four_mebibytes_is_413(server: Running, hand: Hand) -> None:
+def test_over_four_mebibytes_is_413(lasting: Running, hand: Hand) -> None:
     big = hand("up") + bytes((4 << 20) + 1)
-    error(enrol(server, "wave", JOG, big), 413, "too_large")
+    error(enrol(lasting, "wave", JOG, big), 413, "too_large")
     half = hand("up") + bytes(5 << 19)
-    error(enrol(server, "wave", JOG, half, half), 413, "too_large")
-    error(server.http.post("/api/recognise", content=big), 413, "too_large")
-    error(server.http.post("/api/recognise", files={"image": big}), 413, "too_large")
-    id = server.http.get("/api/gestures").json()[0]["id"]
+    error(enrol(lasting, "wave", JOG, half, half), 413, "too_large")
+    error(lasting.http.post("/api/recognise", content=big), 413, "too_large")
+    error(lasting.http.post("/api/recognise", files={"image": big}), 413, "too_large")
+    id = lasting.http.get("/api/gestures").json()[0]["id"]
     error(
-        server.http.post(f"/api/gestures/{id}/samples", files=[("images", big)]), 413, "too_large"
+        lasting.http.post(f"/api/gestures/{id}/samples", files=[("images", big)]), 413, "too_large"
     )
-    assert "wave" not in names(server)
+    assert "wave" not in names(lasting)
 
 
-def test_an_endless_upload_is_refused_while_it_streams(server: Running) -> None:
+def test_an_endless_upload_is_refused_while_it_streams(lasting: Running) -> None:
     sent = 0
 
     def endless() -> Iterator[bytes]:
@@ -239,40 +239,42 @@ def test_an_endless_upload_is_refused_while_it_streams(server: Running) -> None:
             sent += 1 << 16
             yield bytes(1 << 16)
 
-    answer = server.http.post("/api/recognise", content=endless())
+    answer = lasting.http.post("/api/recognise", content=endless())
     error(answer, 413, "too_large")
 
 
-def test_recognise_takes_a_body_or_a_field(server: Running, hand: Hand) -> None:
-    body = server.http.post("/api/recognise", content=hand("left")).json()
-    field = server.http.post("/api/recognise", files={"image": hand("left")}).json()
-    typed = server.http.post(
+def test_recognise_takes_a_body_or_a_field(lasting: Running, hand: Hand) -> None:
+    body = lasting.http.post("/api/recognise", content=hand("left")).json()
+    field = lasting.http.post("/api/recognise", files={"image": hand("left")}).json()
+    typed = lasting.http.post(
         "/api/recognise", content=hand("left"), headers={"Content-Type": "image/jpeg"}
     ).json()
     assert body == field == typed
     assert body["match"]["gesture"] == "left"
     assert body["match"].keys() == {"gesture", "distance", "margin"}
     assert len(body["distances"]) == 10
-    nothing = server.http.post("/api/recognise", content=hand(None)).json()
+    nothing = lasting.http.post("/api/recognise", content=hand(None)).json()
     assert nothing["match"] is None
     assert "no hand" in nothing["reason"]
-    error(server.http.post("/api/recognise"), 422, "invalid")
-    error(server.http.post("/api/recognise", json={}), 415, "unsupported_media_type")
+    error(lasting.http.post("/api/recognise"), 422, "invalid")
+    error(lasting.http.post("/api/recognise", json={}), 415, "unsupported_media_type")
     error(
-        server.http.post("/api/recognise", files=[("image", b"a"), ("image", b"b")]), 422, "invalid"
+        lasting.http.post("/api/recognise", files=[("image", b"a"), ("image", b"b")]),
+        422,
+        "invalid",
     )
 
 
-def test_unknown_routes_and_methods_have_the_same_shape(server: Running) -> None:
-    assert error(server.http.get("/api/nothing"), 404, "not_found") == (
+def test_unknown_routes_and_methods_have_the_same_shape(lasting: Running) -> None:
+    assert error(lasting.http.get("/api/nothing"), 404, "not_found") == (
         "there is nothing at /api/nothing"
     )
-    assert error(server.http.put("/api/gestures"), 405, "method_not_allowed") == (
+    assert error(lasting.http.put("/api/gestures"), 405, "method_not_allowed") == (
         "PUT is not possible at /api/gestures"
     )
-    error(server.http.get("/static/../config.py"), 404, "not_found")
-    error(server.http.get("/static/%2e%2e/config.py"), 404, "not_found")
-    error(server.http.get("/static/"), 404, "not_found")
+    error(lasting.http.get("/static/../config.py"), 404, "not_found")
+    error(lasting.http.get("/static/%2e%2e/config.py"), 404, "not_found")
+    error(lasting.http.get("/static/"), 404, "not_found")
 
 
 def test_what_goes_wrong_inside_is_not_told(

@@ -179,8 +179,8 @@ def test_why_nothing_was_checked_is_an_error(
         ({"action": HOME, "start": "home"}, "invalid"),
     ],
 )
-def test_bad_questions_are_refused(server: Running, body: dict[str, Any], code: str) -> None:
-    error(check(server, **body), 422, code)
+def test_bad_questions_are_refused(lasting: Running, body: dict[str, Any], code: str) -> None:
+    error(check(lasting, **body), 422, code)
 
 
 def test_without_anybody_to_answer_it_is_503(server: Running) -> None:

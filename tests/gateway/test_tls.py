@@ -15,16 +15,9 @@ from cryptography import x509
 from cryptography.hazmat.primitives import serialization
 
 from app.errors import CannotStart
+from app.gateway.certificates import certified_names, make_authority, make_leaf
 from app.gateway.machine import Names, host_names, interface_addresses, machine_names
-from app.gateway.tls import (
-    AUTHORITY_FILE,
-    SERVER_FILE,
-    LocalAuthority,
-    certified_names,
-    make_authority,
-    make_leaf,
-    read_authority,
-)
+from app.gateway.tls import AUTHORITY_FILE, SERVER_FILE, LocalAuthority, read_authority
 
 DAY = datetime.timedelta(days=1)
 HERE = Names(

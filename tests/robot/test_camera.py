@@ -240,7 +240,7 @@ def test_ends_when_its_parent_is_gone(session: zenoh.Session, node: Node, endpoi
     try:
         Viewer(session, "wrist").next()
         parent.kill()
-        wait_for(lambda: not running(child), 5.0)
+        wait_for(lambda: not running(child))
     finally:
         parent.kill()
         parent.wait()

@@ -1,0 +1,85 @@
+"""From a session's newest frame to what the browser is told of it, one frame at a time."""
+
+import asyncio
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor
+
+from app.errors import FrameRefused
+from app.gateway.bad_messages import BadMessages
+from app.gateway.frame_job import FrameDone, FrameWorker
+from app.gateway.frame_slot import FrameSlot
+from app.gateway.metrics import Metrics
+from app.gateway.outbox import Outbox
+
+IDLE_CHECK_S = 0.05
+
+
+class FrameWork:
+    """Takes the newest frame to a thread; ends a gesture when none comes.
+
+    Args:
+        slot: Where the frames come from.
+        worker: What looks at them.
+        images: The threads for that.
+        outbox: Where its messages go.
+        counted: Where good and bad frames are counted.
+        metrics: Of the whole server.
+        stop: Called with reason and source when a frame says stop; must not wait.
+    """
+
+    def __init__(
+        self,
+        slot: FrameSlot,
+        worker: FrameWorker,
+        images: Executor,
+        outbox: Outbox,
+        counted: BadMessages,
+        metrics: Metrics,
+        stop: Callable[[str, str], None],
+    ) -> None:
+        self._slot = slot
+        self._worker = worker
+        self._images = images
+        self._outbox = outbox
+        self._counted = counted
+        self._metrics = metrics
+        self._stop = stop
+
+    async def run(self) -> None:
+        """Work for ever.
+
+        Raises:
+            Closing: too many frames in a row were bad.
+        """
+        loop = asyncio.get_running_loop()
+        while True:
+            job = await self._slot.take(IDLE_CHECK_S)
+            if job is None:
+                ended = self._worker.end(time.monotonic())
+                if ended is not None:
+                    self._outbox.put(ended)
+                continue
+            running = loop.run_in_executor(self._images, self._worker.run, job)
+            running.add_done_callback(self._heed_stop)
+            try:
+                # Shielded: a stop that is shown counts although the browser goes meanwhile.
+                done = await asyncio.shield(running)
+            except FrameRefused as error:
+                self._counted.bad(error, job.seq, job.arrival)
+                continue
+            self._counted.good(job.arrival)
+            self._metrics.frames.labels("processed").inc()
+            self._metrics.frame_times(done.timing_ms)
+            if done.decision.command is not None:
+                self._metrics.commands.inc()
+            for message in done.messages:
+                self._outbox.put(message)
+
+    def _heed_stop(self, running: asyncio.Future[FrameDone]) -> None:
+        """A frame has been looked at: if it says stop, stop."""
+        if running.cancelled() or running.exception() is not None:
+            return
+        stop = running.result().decision.stop
+        if stop is not None:
+            self._stop(stop.reason, "gesture")
