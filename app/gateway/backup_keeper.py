@@ -4,6 +4,7 @@ import asyncio
 import logging
 
 from app.errors import DatabaseBroken, FarhandError
+from app.gateway.roles import Role
 from app.gestures import backup, recovery
 from app.gestures.backup import Place
 
@@ -15,6 +16,11 @@ SETTLE_S = 5.0
 LATEST_S = 60.0
 """And so long after the first change at the latest."""
 RETRY_S = 60.0
+
+OBSERVERS_TOLD = (
+    "The gesture database was lost or is broken, and the robot cannot be armed until an operator "
+    "has mended that."
+)
 
 
 class BackupKeeper:
@@ -37,6 +43,12 @@ class BackupKeeper:
     def problem(self) -> str | None:
         """Why the robot must not be armed, and how to go on."""
         return self._lost or self._broken
+
+    def problem_for(self, role: Role) -> str | None:
+        """:attr:`problem` as somebody of this role is told it: observers get no paths."""
+        if self.problem is None or role == "operator":
+            return self.problem
+        return OBSERVERS_TOLD
 
     def look(self) -> None:
         """Notice what another process did about a lost database; reads one small file."""

@@ -23,7 +23,7 @@ router = APIRouter()
 async def health(request: Request) -> dict[str, Any]:
     """``{"status": "ok"}`` for everybody; the details for who is signed in."""
     answer: dict[str, Any] = {"status": "ok"}
-    if identity_of(request.scope) is None:
+    if (identity := identity_of(request.scope)) is None:
         return answer
     hub: Hub = request.app.state.hub
     try:
@@ -31,7 +31,7 @@ async def health(request: Request) -> dict[str, Any]:
         await asyncio.to_thread(lambda: hub.store.version)
     except FarhandError as error:
         database = error.message
-    database = hub.keeper.problem or database
+    database = hub.keeper.problem_for(identity.role) or database
     robot = hub.robot
     return answer | {
         "version": hub.version,

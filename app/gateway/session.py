@@ -172,7 +172,7 @@ class OperatorSession:
             "session": self.name,
             "version": self._hub.version,
             "gallery": self._hub.gallery.version,
-            "problem": self._hub.keeper.problem,
+            "problem": self._hub.keeper.problem_for(self.role),
             "limits": {
                 "frame_bytes": decode.max_bytes,
                 "frame_width": decode.max_width,
@@ -323,7 +323,7 @@ class OperatorSession:
             "type": "gallery",
             "version": self._hub.gallery.version,
             "gallery": self._gallery.id,
-            "problem": self._hub.keeper.problem,
+            "problem": self._hub.keeper.problem_for(self.role),
         }
         self.outbox.put(message)
 

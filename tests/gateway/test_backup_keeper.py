@@ -10,7 +10,7 @@ from sqlalchemy import event
 
 from app.errors import CannotStart, DatabaseBroken, StorageFull
 from app.gateway import backup_keeper
-from app.gateway.backup_keeper import BackupKeeper
+from app.gateway.backup_keeper import OBSERVERS_TOLD, BackupKeeper
 from app.gateway.gallery import DATABASE_FILE, place_of
 from app.gateway.tokens import TokenStore
 from app.gestures import GestureStore, backup, recovery
@@ -151,6 +151,12 @@ def test_a_database_that_breaks_while_the_server_runs_keeps_it_from_arming(
         assert "is damaged" in told and "cannot be armed until" in told
         assert refuses_to_arm(operator) == told
         assert server.http.get("/api/health").json()["database"] == told
+        made = TokenStore(server.hub.settings.data_dir / "tokens.json").make("observer", "Anna")
+        watching = {"Authorization": f"Bearer {made.secret}"}
+        with server.operator(additional_headers=watching) as observer:
+            assert observer.hello["problem"] == OBSERVERS_TOLD
+        health = server.http.get("/api/health", headers=watching).json()
+        assert health["database"] == OBSERVERS_TOLD
 
 
 def test_a_backup_that_does_not_pass_its_check_keeps_the_robot_from_being_armed(
