@@ -1,22 +1,27 @@
 // The page, put together: core/ talks to the server, ui/ shows and asks, this file joins them.
 
 import { api } from "./core/api.js";
+import { followClip } from "./core/captions.js";
 import { CameraFeed } from "./core/camera-feed.js";
+import { Describer } from "./core/describer.js";
 import { FrameSender } from "./core/frame-sender.js";
 import { GalleryKeeper } from "./core/galleries.js";
 import { GamepadReader } from "./core/gamepad.js";
 import { Held } from "./core/held.js";
+import { inspection } from "./core/inspection.js";
 import { grabStill, Stills } from "./core/jpeg.js";
 import { Latency } from "./core/latency.js";
 import { memory } from "./core/memory.js";
 import { changesFor, INITIAL_STATE } from "./core/messages.js";
 import { OperatorLink } from "./core/operator-link.js";
+import { PictureReport } from "./core/picture-report.js";
 import { preflight } from "./core/preflight.js";
 import { SourceKeeper } from "./core/source-keeper.js";
 import { ServerClock } from "./core/server-clock.js";
 import { Stopper } from "./core/stopper.js";
 import { Store } from "./core/store.js";
 import { texts } from "./texts/en.js";
+import { Control } from "./ui/control.js";
 import { setText } from "./ui/dom.js";
 import { dockButtons, steps, stopButton } from "./ui/dock.js";
 import { gestureList } from "./ui/gesture-list.js";
@@ -27,7 +32,7 @@ import { latencyBar } from "./ui/latency-bar.js";
 import { Notices } from "./ui/notices.js";
 import { operatorView } from "./ui/operator-view.js";
 import { isDriving, keepRootClasses, preparePage } from "./ui/page.js";
-import { askingNotice, takeOverContent } from "./ui/people.js";
+import { askingNotice } from "./ui/people.js";
 import { preflightContent } from "./ui/preflight.js";
 import { readout } from "./ui/readout.js";
 import { sentence } from "./ui/sentence.js";
@@ -54,15 +59,22 @@ const latency = new Latency(clock);
 const when = (tick) => clock.when(tick);
 const feeds = { wrist: new CameraFeed("wrist", when), scene: new CameraFeed("scene", when) };
 const held = new Held(link);
+const describer = new Describer(api, store);
+const pictures = new PictureReport(
+    link,
+    feeds,
+    () => isDriving(store.state),
+    (camera, shown) => latency.picture(camera, shown),
+);
 let jog = { down: () => false, up: () => {}, pad: () => {} }; // until somebody drives by keys
-const counts = { hello: 0, frame: 0, gesture: 0, robot: 0, gallery: 0, pong: 0, error: 0 };
-let lastError = null;
+const counts = { hello: 0, frame: 0, gesture: 0, robot: 0, gallery: 0, pong: 0, error: 0, lastError: null };
 
 // What is shown
 
 const root = document.documentElement;
 const sheets = new Sheets(byId("sheets"));
 const notices = new Notices(byId("notices"));
+const control = new Control(link, store, sheets, notices);
 askingNotice(byId("asking"), store);
 keepRootClasses(root, store);
 statePill(byId("state-pill"), store);
@@ -90,6 +102,7 @@ const reading = () => latency.reading(performance.now(), byId("stage").dataset.l
 latencyBar(byId("stage"), reading);
 
 const sender = new FrameSender(link, video);
+followClip(api, store, video);
 const source = new SourceKeeper(video, store, sender);
 let stills = null;
 const starting = new Starting({
@@ -102,7 +115,7 @@ const starting = new Starting({
     galleries,
     templateUrl: api.templateUrl,
     act: {
-        takeControl,
+        takeControl: () => control.take(),
         disarm: () => link.send("disarm"),
         take: () => (stills ||= new Stills()).take(video),
         check: (pictures) => api.checkGesture(pictures, store.state.gallery),
@@ -200,17 +213,8 @@ link.addEventListener("message", ({ detail: message }) => {
     else if (message.type === "robot") {
         stopper.saw(message);
         latency.robot(message, isDriving(store.state), performance.now());
-        // A robot that is silent for a moment names no driver: nothing is lost by that.
-        if (message.online) {
-            const drives = isDriving(store.state);
-            if (drove && !drives && !releasing) notices.show(texts.notices.lostControl);
-            drove = drives;
-        }
-        if (asked && isDriving(store.state)) {
-            asked = false;
-            notices.show(texts.people.yours, { kind: "good", name: "control" });
-        }
-        describeRobot();
+        control.robotSpoke(message.online);
+        describer.ask(robotId());
     } else if (message.type === "frame") {
         latency.frame(message, sender.answered(message.seq), performance.now());
         const { width, height } = sender;
@@ -221,19 +225,18 @@ link.addEventListener("message", ({ detail: message }) => {
     } else if (message.type === "gallery") {
         tellProblem(message.problem);
         galleries.heard(message);
-    }
-    else if (message.type === "error") refused(message);
+    } else if (message.type === "error") refused(message);
 });
 
 function greeted() {
     store.set({ connection: { state: "open" } });
     sendSpeed();
-    reported = {};
-    drove = false;
+    pictures.restart();
+    control.greeted();
     if (hadSession) notices.show(texts.notices.reconnected, { name: "reconnected" });
     hadSession = true;
-    describedAt = -Infinity;
-    describeRobot();
+    describer.restart();
+    describer.ask(robotId());
     tellProblem(store.state.hello.problem);
     galleries.greeted();
     // Somebody pressed STOP and nobody heard: say it again, first of all.
@@ -242,9 +245,9 @@ function greeted() {
 }
 
 function refused(message) {
-    lastError = message;
+    counts.lastError = message;
     if (galleries.refused(message)) return;
-    if (message.code === "control_kept") asked = false;
+    if (message.code === "control_kept") control.refused();
     if (Number.isFinite(message.seq) && message.seq !== null) {
         sender.answered(message.seq);
         return; // a single frame; the next one comes at once
@@ -258,27 +261,6 @@ function tellProblem(problem) {
     else notices.clear("gestures");
 }
 
-const DESCRIBE_EVERY_MS = 3000;
-let describedAt = -Infinity;
-
-/** The robot's limits and poses; asked again until it answers. */
-async function describeRobot() {
-    const robot = robotId();
-    const now = performance.now();
-    if (!robot || now - describedAt < DESCRIBE_EVERY_MS) return;
-    describedAt = now;
-    try {
-        const answer = await api.robot(robot);
-        const description = answer && (answer.description || answer);
-        if (description && Array.isArray(description.joints) && description.poses) {
-            describedAt = Infinity;
-            store.set({ description });
-        }
-    } catch {
-        // Not there yet; the read-out does without limits until then.
-    }
-}
-
 /** Masks and distances cost the server a little, the glass box more: only while somebody looks. */
 function sendView() {
     const detail = document.visibilityState !== "hidden";
@@ -288,26 +270,6 @@ document.addEventListener("visibilitychange", () => {
     sendView();
     if (document.visibilityState !== "hidden") link.retryNow();
 });
-
-const REPORT_EVERY_MS = 250;
-const shown = {}; // what is known of the newest picture that was drawn, by camera
-let reported = {};
-for (const [name, feed] of Object.entries(feeds)) {
-    feed.addEventListener("picture", ({ detail }) => {
-        shown[name] = { tick: detail.tick, takenAt: detail.takenAt, shownAt: performance.now() };
-        latency.picture(name, shown[name]);
-    });
-}
-
-/** Who drives by pictures says which ones: the robot holds still when they are old. */
-setInterval(() => {
-    if (!isDriving(store.state)) return;
-    for (const [camera, { tick }] of Object.entries(shown)) {
-        if (reported[camera] === tick) continue;
-        reported[camera] = tick;
-        link.send("picture", { camera, tick });
-    }
-}, REPORT_EVERY_MS);
 
 function sendSpeed() {
     link.send("speed", { scale: speedOf(store.state) });
@@ -325,64 +287,7 @@ setInterval(() => {
     store.set({ sender: { latencyMs, rate, width, height } });
 }, 250);
 
-let captions = null;
-
-/** What the synthetic operator shows now; undefined while that is not known. */
-async function captionClip() {
-    if (store.state.source.kind !== "synthetic" || store.state.source.state !== "running") return;
-    if (!captions) {
-        captions = [];
-        try {
-            captions = await api.operatorCaptions();
-        } catch {
-            // Then there are no captions.
-        }
-    }
-    const now = video.currentTime;
-    const shown = captions.find(({ start_s, end_s }) => start_s <= now && now < end_s);
-    store.set({ clipGesture: captions.length ? (shown ? shown.gesture : null) : undefined });
-}
-setInterval(captionClip, 150);
-
 // What the person wants
-
-let drove = false; // as the robot said when it last spoke
-let releasing = false; // control was given back, so that losing it is no news
-let asked = false; // for control, of whoever drives
-
-function takeControl(takeover = false) {
-    releasing = false;
-    link.send("take_control", takeover ? { takeover: true } : {});
-}
-
-function askControl() {
-    const { robot } = store.state;
-    releasing = false;
-    asked = link.send("ask_control");
-    if (asked && robot && robot.controller) {
-        notices.show(texts.people.asked(robot.controller), { name: "control" });
-    }
-}
-
-function toggleControl() {
-    const { robot } = store.state;
-    if (!robot) return;
-    if (isDriving(store.state)) {
-        releasing = true;
-        link.send("release_control");
-    } else if (robot.controller) {
-        const then = (go) => () => {
-            sheets.close();
-            go();
-        };
-        const content = takeOverContent(robot.controller, {
-            ask: then(askControl),
-            take: then(() => takeControl(true)),
-            cancel: then(() => {}),
-        });
-        sheets.show("take-over", texts.takeOver.title, content);
-    } else takeControl();
-}
 
 function toggleArm() {
     if (!isDriving(store.state)) return;
@@ -465,12 +370,9 @@ const wishes = {
     reset,
     source: (wanted) => starting.choose(wanted),
     swap: () => views.swap(),
-    "toggle-control": toggleControl,
+    "toggle-control": () => control.toggle(),
     "keep-control": () => link.send("keep_control"),
-    "hand-over": ({ to }) => {
-        releasing = true;
-        link.send("hand_over", { to });
-    },
+    "hand-over": ({ to }) => control.handOver(to),
     "toggle-arm": toggleArm,
     glass: ({ open }) => {
         store.set({ glass: open });
@@ -497,48 +399,7 @@ root.addEventListener("farhand:want", ({ detail }) => wishes[detail.what](detail
 byId("help-open").addEventListener("click", wishes.help);
 byId("teach-open").addEventListener("click", () => teach());
 
-/**
- * For tests in a browser and for the curious; reads only. `robot`, `frame`, `gesture`, `hello` are
- * the newest messages, `counts` how many of each type came, `frames` what became of the webcam's
- * pictures, `pictures` how many each robot camera has shown, `shown` what the newest of them is
- * ({tick, takenAt, shownAt}), `latency` where a frame's time goes, `error` the newest `error` message.
- */
-window.farhand = Object.freeze({
-    get state() {
-        return { ...store.state };
-    },
-    get hello() {
-        return store.state.hello;
-    },
-    get robot() {
-        return store.state.robot;
-    },
-    get frame() {
-        return store.state.frame;
-    },
-    get gesture() {
-        return store.state.gesture;
-    },
-    get error() {
-        return lastError;
-    },
-    get counts() {
-        return { ...counts };
-    },
-    get frames() {
-        const { counts: became, latencyMs, rate, level, width, height } = sender;
-        return { ...became, latencyMs, rate, level, width, height };
-    },
-    get pictures() {
-        return { wrist: feeds.wrist.pictures, scene: feeds.scene.pictures };
-    },
-    get shown() {
-        return { ...shown };
-    },
-    get latency() {
-        return reading();
-    },
-});
+window.farhand = inspection({ store, sender, feeds, counts, shown: () => pictures.shown, reading });
 
 link.open();
 source.listCameras();
