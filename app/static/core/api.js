@@ -10,7 +10,11 @@ export class ApiError extends Error {
     }
 }
 
-async function request(method, path, { body, json, timeoutMs = 15000 } = {}) {
+/**
+ * Ask the server; gives the answer's JSON. Where gestures were changed it has `change`, the id to
+ * take that back by. Throws ApiError.
+ */
+export async function request(method, path, { body, json, timeoutMs = 15000 } = {}) {
     const init = { method, credentials: "same-origin", cache: "no-store" };
     if (json !== undefined) {
         init.headers = { "Content-Type": "application/json" };
@@ -31,7 +35,10 @@ async function request(method, path, { body, json, timeoutMs = 15000 } = {}) {
     } catch {
         // 204, or a proxy's own page
     }
-    if (answer.ok) return data;
+    if (answer.ok) {
+        const change = answer.headers.get("Farhand-Change");
+        return change ? Object.assign(data || {}, { change }) : data;
+    }
     const error = (data && data.error) || {};
     throw new ApiError(answer.status, error.code || "http", error.message || "", error.detail);
 }
@@ -93,6 +100,8 @@ export const api = Object.freeze({
         request("POST", `api/gestures/${id(gesture)}/samples?replace=true`, {
             body: imageForm(images),
         }),
+    /** Take a change of gestures back. */
+    undo: (change) => request("POST", `api/changes/${id(change)}/undo`),
     deleteGesture: (gesture) => request("DELETE", `api/gestures/${id(gesture)}`),
     recognise(image, gallery) {
         const form = inGallery(new FormData(), gallery);
