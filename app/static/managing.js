@@ -17,10 +17,10 @@ const jobs = {
 const toEnd = (job, { onProgress, signal }) =>
     follow(job, { api: jobs, signal, onProgress: ({ done, total }) => onProgress(done, total) });
 
-/** Send a file, and follow what the server does with it. */
-async function sent(path, file, ways) {
-    const { onProgress, signal } = ways;
-    return toEnd(await upload(path, file, ZIP, { signal, onProgress: (part) => onProgress(part, 2) }), ways);
+/** Send a file, and follow what the server does with it: half of the way each. */
+async function sent(path, file, { onProgress, signal }) {
+    const job = await upload(path, file, ZIP, { signal, onProgress: (part) => onProgress(part, 2) });
+    return toEnd(job, { signal, onProgress: (done, total) => onProgress(1 + (total && done / total), 2) });
 }
 
 /**
