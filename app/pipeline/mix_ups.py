@@ -46,7 +46,7 @@ class Worst(NamedTuple):
         other: The other one.
         level: ``mistaken``: it was taken for it; ``undecided``: it was refused because both were
             almost equally close; ``near``: neither happened, but it is nearly as near as its own.
-        count: How often, of ``asked``.
+        times: How often, of ``asked``.
         asked: Samples of ``shown`` that were tried.
         teach: The one of both that is worth teaching again: fewer of its samples were known.
     """
@@ -54,7 +54,7 @@ class Worst(NamedTuple):
     shown: str
     other: str
     level: Level
-    count: int
+    times: int
     asked: int
     teach: str
 
@@ -139,8 +139,7 @@ def _worst(answers: Sequence[Answer]) -> Worst | None:
             if not mistaken and not torn and nearness < LIKELY:
                 continue
             level: Level = "mistaken" if mistaken else "undecided" if torn else "near"
-            count = mistaken or torn
             teach = min(shown, other, key=lambda label: known.get(label, 0.0))
             rank = (mistaken / len(mine), torn / len(mine), nearness)
-            found.append((rank, Worst(shown, other, level, count, len(mine), teach)))
+            found.append((rank, Worst(shown, other, level, mistaken or torn, len(mine), teach)))
     return max(found, key=lambda pair: pair[0])[1] if found else None

@@ -170,7 +170,7 @@ MATRIX: dict[str, Any] = {
 def test_the_worst_pair_is_named_with_advice(
     modules: Page, worst: str | None, words: str, teach: str | None
 ) -> None:
-    pair = {"shown": "a", "other": "b", "level": worst, "count": 2, "asked": 8, "teach": "a"}
+    pair = {"shown": "a", "other": "b", "level": worst, "times": 2, "asked": 8, "teach": "a"}
     given = {**MATRIX, "worst": pair if worst else None}
     said = run(modules, "ui/manager/matrix.js", "return m.verdict(a)", given)
     assert said == {"text": words, "teach": teach}

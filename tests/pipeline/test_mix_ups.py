@@ -54,7 +54,7 @@ def test_two_alike_are_found_and_named():
     assert {found.worst.shown, found.worst.other} == {"two", "twin"}
     assert found.worst.level in ("mistaken", "undecided")
     assert found.worst.teach in ("two", "twin")
-    assert 0 < found.worst.count <= found.worst.asked == 4
+    assert 0 < found.worst.times <= found.worst.asked == 4
 
 
 def test_a_sample_that_strayed_is_taken_for_what_it_shows():
@@ -63,7 +63,7 @@ def test_a_sample_that_strayed_is_taken_for_what_it_shows():
     assert found.counts[0] == [4, 1]
     assert found.worst is not None
     assert (found.worst.shown, found.worst.other, found.worst.level) == ("fist", "five", "mistaken")
-    assert (found.worst.count, found.worst.asked, found.worst.teach) == (1, 5, "fist")
+    assert (found.worst.times, found.worst.asked, found.worst.teach) == (1, 5, "fist")
 
 
 def test_what_has_one_sample_is_not_tried_but_can_be_taken_for():
@@ -96,7 +96,7 @@ def test_undecided_and_near_are_told_apart():
 
     torn = tally(["a", "b"], [one(None, "b", 0.3, 0.31), one("a", None, 0.1, 0.5)])
     assert torn.worst is not None
-    assert (torn.worst.level, torn.worst.count, torn.worst.teach) == ("undecided", 1, "b")
+    assert (torn.worst.level, torn.worst.times, torn.worst.teach) == ("undecided", 1, "b")
     near = tally(["a", "b"], [one("a", None, 0.3, 0.32)])
     assert near.worst is not None and near.worst.level == "near"
     assert tally(["a", "b"], [one("a", None, 0.3, 0.5)]).worst is None

@@ -12,8 +12,8 @@ export function verdict({ gestures, worst }) {
     if (!gestures.some(({ asked }) => asked)) return { text: words.nothing, teach: null };
     if (!worst) return { text: words.good, teach: null };
     const name = (id) => gestures.find((gesture) => gesture.id === id).name;
-    const { shown, other, level, count, asked, teach } = worst;
-    return { text: words.worst[level](name(shown), name(other), count, asked, name(teach)), teach };
+    const { shown, other, level, times, asked, teach } = worst;
+    return { text: words.worst[level](name(shown), name(other), times, asked, name(teach)), teach };
 }
 
 /** From 0 (never) to LEVELS (always): how dark a cell is. Anything but never can be seen. */
