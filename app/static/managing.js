@@ -1,6 +1,6 @@
 // The gesture manager, put together when it is first wanted.
 
-import { request } from "./core/api.js";
+import { change, request } from "./core/api.js";
 import { follow } from "./core/long-work.js";
 import { download, upload } from "./core/transfer.js";
 import { managerContent } from "./ui/manager/manager.js";
@@ -40,8 +40,8 @@ export async function manager({ store, api, undo, edit }) {
         act: {
             rename: (gesture, name) => api.updateGesture(gesture, { name }),
             retire: (gesture, active) => api.updateGesture(gesture, { active }),
-            deleteSample: (gesture, one) => request("DELETE", sample(gesture, one)),
-            moveSample: (gesture, one, to) => request("POST", `${sample(gesture, one)}/move`, { json: { to } }),
+            deleteSample: (gesture, one) => change("DELETE", sample(gesture, one)),
+            moveSample: (gesture, one, to) => change("POST", `${sample(gesture, one)}/move`, { json: { to } }),
             matrix: async (ways) => toEnd(await request("POST", `${gallery()}/matrix`), ways),
             check: (file, existing, ways) => sent(`${gallery()}/import?existing=${existing}&check=true`, file, ways),
             import: (file, existing, plan, ways) =>

@@ -43,6 +43,12 @@ export async function request(method, path, { body, json, timeoutMs = 15000 } = 
     throw new ApiError(answer.status, error.code || "http", error.message || "", error.detail);
 }
 
+const CHANGE_MS = 60000;
+
+/** The same for what changes gestures: a large gallery is learned anew before the answer. */
+export const change = (method, path, options = {}) =>
+    request(method, path, { timeoutMs: CHANGE_MS, ...options });
+
 const id = encodeURIComponent;
 
 function imageForm(images) {
@@ -77,13 +83,13 @@ export const api = Object.freeze({
         const form = inGallery(imageForm(images), gallery);
         form.append("name", name);
         form.append("action", JSON.stringify(action));
-        return request("POST", "api/gestures", { body: form });
+        return change("POST", "api/gestures", { body: form });
     },
     updateGesture: (gesture, changes) =>
-        request("PATCH", `api/gestures/${id(gesture)}`, { json: changes }),
+        change("PATCH", `api/gestures/${id(gesture)}`, { json: changes }),
     versions: (gesture) => request("GET", `api/gestures/${id(gesture)}/versions`),
     restoreVersion: (gesture, version) =>
-        request("POST", `api/gestures/${id(gesture)}/versions/${id(version)}/restore`),
+        change("POST", `api/gestures/${id(gesture)}/versions/${id(version)}/restore`),
     /** Would an action break a limit? Nothing moves. */
     dryRun: (robot, action, from) =>
         request("POST", `api/robots/${id(robot)}/dry-run`, {
@@ -94,15 +100,15 @@ export const api = Object.freeze({
     checkGesture: (images, gallery) =>
         request("POST", "api/gestures/check", { body: inGallery(imageForm(images), gallery) }),
     addSamples: (gesture, images) =>
-        request("POST", `api/gestures/${id(gesture)}/samples`, { body: imageForm(images) }),
+        change("POST", `api/gestures/${id(gesture)}/samples`, { body: imageForm(images) }),
     /** The same, in place of all samples that there are. */
     replaceSamples: (gesture, images) =>
-        request("POST", `api/gestures/${id(gesture)}/samples?replace=true`, {
+        change("POST", `api/gestures/${id(gesture)}/samples?replace=true`, {
             body: imageForm(images),
         }),
     /** Take a change of gestures back. */
-    undo: (change) => request("POST", `api/changes/${id(change)}/undo`),
-    deleteGesture: (gesture) => request("DELETE", `api/gestures/${id(gesture)}`),
+    undo: (made) => change("POST", `api/changes/${id(made)}/undo`),
+    deleteGesture: (gesture) => change("DELETE", `api/gestures/${id(gesture)}`),
     recognise(image, gallery) {
         const form = inGallery(new FormData(), gallery);
         form.append("image", image, "still.jpg");

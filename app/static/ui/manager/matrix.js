@@ -43,8 +43,7 @@ export function matrixTable({ gestures, counts, rejected }) {
         { class: "matrix-scroll", tabindex: "0", role: "region", "aria-label": words.title },
         el(
             "table",
-            { class: "matrix" },
-            el("caption", { class: "quiet", text: words.legend }),
+            { class: "matrix", "aria-label": words.title },
             el(
                 "thead",
                 {},
@@ -65,7 +64,7 @@ export function matrixView(panel, signal, { act, edit }) {
             el("p", { class: "matrix-verdict", role: "status", text }),
             ...(teach ? [el("div", { class: "row" }, button(texts.manager.teachAgain, { id: "matrix-teach", onclick: () => edit(teach) }))] : []),
             ...(names.length ? [el("p", { class: "quiet", text: words.untested(names.join(", ")) })] : []),
-            ...(gestures.length ? [matrixTable(result)] : []),
+            ...(gestures.length ? [el("p", { class: "quiet", text: words.legend }), matrixTable(result)] : []),
             el("p", { class: "quiet", text: words.caution }),
         ];
     });
