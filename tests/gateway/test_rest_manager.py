@@ -1,6 +1,8 @@
 """What the gesture manager does, over REST: samples, undo, mix-ups, a gallery as a file."""
 
+import io
 import threading
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -51,6 +53,14 @@ def server(server: Running) -> Running:
 def gestures(server: Running) -> dict[str, dict[str, Any]]:
     """By name."""
     return {gesture["name"]: gesture for gesture in server.http.get("/api/gestures").json()}
+
+
+def zipped(index: str) -> bytes:
+    """A zip file with nothing but an index."""
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr("gestures.toml", index)
+    return file.getvalue()
 
 
 def seen(server: Running) -> list[Any]:
@@ -261,7 +271,8 @@ def test_a_bad_file_changes_nothing_and_says_what_is_wrong(server: Running) -> N
         (b"", "neither a readable folder nor a readable zip file"),
         (b"hello", "neither a readable folder nor a readable zip file"),
         (good[:-30], "neither a readable folder nor a readable zip file"),
-        (good.replace(b"format = 1", b"format = 9"), "zip"),
+        (zipped("format = 9"), "gestures.toml has format 9; this Farhand reads format 1"),
+        (zipped('format = 1\n[[gesture]]\nname = "x"'), "gesture 1 (x): samples is missing"),
     ):
         job = ended(server, api.post(path, content=body, headers=ZIP))
         assert (job["state"], job["error"]["code"]) == ("failed", "invalid"), job

@@ -26,14 +26,16 @@ function cell(count, asked, kind) {
     return el("td", { class: level ? `${kind} shade-${level}` : "is-none", text: String(count) });
 }
 
+const head = (scope, text) => el("th", { scope }, el("span", { text }));
+
 /** The table; rows are what is shown, columns what it is taken for. */
 export function matrixTable({ gestures, counts, rejected }) {
-    const head = [...gestures.map(({ name }) => name), words.rejected];
+    const columns = [...gestures.map(({ name }) => name), words.rejected];
     const rows = gestures.map(({ name, asked }, row) =>
         el(
             "tr",
             {},
-            el("th", { scope: "row", text: words.row(name, asked) }),
+            head("row", words.row(name, asked)),
             ...gestures.map((_, column) => cell(counts[row][column], asked, row === column ? "is-right" : "is-wrong")),
             cell(rejected[row], asked, "is-rejected"),
         ),
@@ -47,7 +49,7 @@ export function matrixTable({ gestures, counts, rejected }) {
             el(
                 "thead",
                 {},
-                el("tr", {}, el("th", { scope: "col", text: words.corner }), ...head.map((text) => el("th", { scope: "col", text }))),
+                el("tr", {}, ...[words.corner, ...columns].map((text) => head("col", text))),
             ),
             el("tbody", {}, ...rows),
         ),
