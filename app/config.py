@@ -477,6 +477,12 @@ class GatewaySettings(_Section):
         le=64 << 20,
         description="bytes of one upload over REST that enrols a burst of frames",
     )
+    max_import_bytes: int = Field(
+        default=16 << 20,
+        ge=64 * 1024,
+        le=64 << 20,
+        description="bytes of a gallery's file that is imported over REST",
+    )
     max_bad_messages: int = Field(
         default=10, ge=1, le=1000, description="bad messages in a row that close a session (1007)"
     )

@@ -102,6 +102,23 @@ GALLERY_BODY: dict[str, Any] = {
         }
     },
 }
+MOVE_BODY: dict[str, Any] = {
+    "required": True,
+    "content": {
+        "application/json": {
+            "schema": {
+                "type": "object",
+                "required": ["to"],
+                "properties": {"to": {"type": "string", "description": "id of a gesture"}},
+                "additionalProperties": False,
+            }
+        }
+    },
+}
+ZIP_BODY: dict[str, Any] = {
+    "required": True,
+    "content": {"application/zip": {"schema": {"type": "string", "format": "binary"}}},
+}
 DRY_RUN_BODY: dict[str, Any] = {
     "required": True,
     "content": {

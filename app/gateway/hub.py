@@ -11,6 +11,7 @@ from app.config import Settings
 from app.errors import DatabaseBroken, NotAllowed
 from app.gateway.backup_keeper import BackupKeeper
 from app.gateway.gallery import LiveGallery, open_for_server, place_of
+from app.gateway.jobs import Jobs
 from app.gateway.lease_keeper import check_reply
 from app.gateway.metrics import Metrics
 from app.gateway.numbers import Counter
@@ -70,6 +71,7 @@ class Hub:
         self.closing = asyncio.Event()
         self.checking = asyncio.Lock()
         """Held while a program is being checked."""
+        self.jobs = Jobs()
         self._link_threads = ThreadPoolExecutor(LINK_THREADS, "link")
         self._stop_threads = ThreadPoolExecutor(STOP_THREADS, "stop")
         self._told_version = gallery.version
@@ -127,6 +129,7 @@ class Hub:
                 await asyncio.gather(*tasks, return_exceptions=True)
 
     async def _close(self) -> None:
+        await self.jobs.close()
         await self.relay.close()
         for pool in (self._link_threads, self._stop_threads):
             pool.shutdown(wait=False, cancel_futures=True)

@@ -5,9 +5,10 @@ from typing import Any
 
 from fastapi import APIRouter, Request
 
-from app.errors import Invalid, RequestError, RobotUnavailable
+from app.errors import Invalid, RobotUnavailable
 from app.gateway.bodies import DRY_RUN_BODY
 from app.gateway.errors import BAD_BODY
+from app.gateway.jobs import Busy
 from app.gateway.json_bodies import parse_action, read_object
 from app.gateway.rest_robots import robot_of
 from app.link.messages import DryRunRequest
@@ -16,13 +17,6 @@ router = APIRouter(prefix="/api/robots", tags=["robots"])
 
 START_MAX = 40
 """Characters of a pose's name."""
-
-
-class Busy(RequestError):
-    """One program is checked at a time."""
-
-    default_code = "busy"
-    status = 429
 
 
 @router.post(

@@ -20,6 +20,7 @@ from app.gateway.enrolment import (
 from app.gateway.errors import BAD_BODY
 from app.gateway.gallery import Enrolled
 from app.gateway.json_bodies import parse_action, parse_json
+from app.gateway.undo_offer import UndoOffer
 from app.gateway.uploads import read_enrolment, read_image
 from app.gestures import Gesture, template_png
 from app.gestures.records import SHARED, clean_name
@@ -99,10 +100,18 @@ async def create_gesture(request: Request, response: Response) -> dict[str, Any]
     await asyncio.to_thread(hub.store.galleries.get, gallery)
     judged = await judge_for_enrolment(hub, upload.images, burst=upload.burst)
     confusions = await confusions_of(hub, gallery, name, judged.templates)
+    offer = UndoOffer(hub.store)
     gesture = await asyncio.to_thread(
-        hub.store.create, name, action, judged.templates, active=active, gallery=gallery
+        hub.store.create,
+        name,
+        action,
+        judged.templates,
+        active=active,
+        gallery=gallery,
+        undo_as=offer.id,
     )
     await hub.gallery_changed()
+    offer.to(response)
     response.headers["Location"] = f"/api/gestures/{gesture.id}"
     return _enrolled_json(gesture, judged, upload.burst, confusions)
 
@@ -208,9 +217,12 @@ async def get_gesture(request: Request, id: str) -> dict[str, Any]:
 async def delete_gesture(request: Request, id: str) -> Response:
     """Forget a gesture and its samples."""
     hub = hub_of(request)
-    await asyncio.to_thread(hub.store.delete, id)
+    offer = UndoOffer(hub.store)
+    await asyncio.to_thread(hub.store.delete, id, undo_as=offer.id)
     await hub.gallery_changed()
-    return Response(status_code=204)
+    response = Response(status_code=204)
+    offer.to(response)
+    return response
 
 
 @router.post(
@@ -227,6 +239,7 @@ async def delete_gesture(request: Request, id: str) -> Response:
 )
 async def add_samples(
     request: Request,
+    response: Response,
     id: str,
     replace: Annotated[bool, Query(description="in place of all samples so far")] = False,
 ) -> dict[str, Any]:
@@ -238,8 +251,12 @@ async def add_samples(
     kept = [] if replace else [sample.template for sample in gesture.samples]
     templates = kept + judged.templates
     confusions = await confusions_of(hub, gesture.gallery, gesture.name, templates, id)
-    gesture = await asyncio.to_thread(hub.store.add_samples, id, judged.templates, replace=replace)
+    offer = UndoOffer(hub.store)
+    gesture = await asyncio.to_thread(
+        hub.store.add_samples, id, judged.templates, replace=replace, undo_as=offer.id
+    )
     await hub.gallery_changed()
+    offer.to(response)
     return _enrolled_json(gesture, judged, upload.burst, confusions)
 
 

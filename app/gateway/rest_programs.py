@@ -4,12 +4,14 @@ import asyncio
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Request
+from starlette.responses import Response
 
 from app.errors import Invalid
 from app.gateway.bodies import PATCH_BODY
 from app.gateway.errors import BAD_BODY
 from app.gateway.json_bodies import parse_action, read_object
 from app.gateway.rest_gestures import confusions_of, gesture_json, hub_of
+from app.gateway.undo_offer import UndoOffer
 from app.gestures.records import ActionVersion
 from app.link.actions import ACTION
 
@@ -38,7 +40,7 @@ def version_json(version: ActionVersion) -> dict[str, Any]:
         422: {"description": "a bad name or action"},
     },
 )
-async def update_gesture(request: Request, id: str) -> dict[str, Any]:
+async def update_gesture(request: Request, response: Response, id: str) -> dict[str, Any]:
     """Change what is named: ``{"name": ..., "action": {...}, "active": true}``.
 
     With ``version``, the newest version of the action that the caller knows, the change is refused
@@ -59,10 +61,18 @@ async def update_gesture(request: Request, id: str) -> dict[str, Any]:
     if "version" in changes and (not isinstance(version, int) or isinstance(version, bool)):
         raise Invalid("version must be a whole number", field="version")
     action = parse_action(changes["action"]) if "action" in changes else None
+    offer = UndoOffer(hub.store)
     gesture = await asyncio.to_thread(
-        hub.store.update, id, name=name, action=action, active=active, version=version
+        hub.store.update,
+        id,
+        name=name,
+        action=action,
+        active=active,
+        version=version,
+        undo_as=offer.id,
     )
     await hub.gallery_changed()
+    offer.to(response)
     if active is None:
         return gesture_json(gesture)
     templates = [sample.template for sample in gesture.samples]
@@ -86,9 +96,13 @@ async def list_versions(request: Request, id: str) -> list[dict[str, Any]]:
     summary="Give a gesture an action that it had",
     responses={404: {"description": "unknown id or version"}},
 )
-async def restore_version(request: Request, id: str, version: Version) -> dict[str, Any]:
+async def restore_version(
+    request: Request, response: Response, id: str, version: Version
+) -> dict[str, Any]:
     """The action of that version becomes the newest version. The gesture."""
     hub = hub_of(request)
-    gesture = await asyncio.to_thread(hub.store.restore, id, version)
+    offer = UndoOffer(hub.store)
+    gesture = await asyncio.to_thread(hub.store.restore, id, version, undo_as=offer.id)
     await hub.gallery_changed()
+    offer.to(response)
     return gesture_json(gesture)

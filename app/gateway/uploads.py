@@ -164,6 +164,28 @@ async def read_image(request: Request, limit: int) -> Upload:
         return upload
     if not kind.startswith("image/") and kind not in ("", "application/octet-stream"):
         raise UnsupportedMedia(f"send an image or multipart/form-data, not {kind}", given=kind)
+    return Upload({}, [await _whole(request, limit)])
+
+
+async def read_file(request: Request, limit: int, kinds: tuple[str, ...]) -> bytes:
+    """Read a body that is one file.
+
+    Args:
+        request: The request, its body unread.
+        limit: Bytes allowed.
+        kinds: Media types that it may be said to have, the best first.
+
+    Raises:
+        TooLarge: over the limit; raised as soon as it is.
+        UnsupportedMedia: it is said to be something else.
+    """
+    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    if kind not in kinds:
+        raise UnsupportedMedia(f"send {kinds[0]}, not {kind or 'nothing'}", given=kind)
+    return await _whole(request, limit)
+
+
+async def _whole(request: Request, limit: int) -> bytes:
     parts = []
     size = 0
     async for part in _limited(request, limit).stream():
@@ -171,4 +193,4 @@ async def read_image(request: Request, limit: int) -> Upload:
         if size > limit:
             raise _too_large(limit)
         parts.append(part)
-    return Upload({}, [b"".join(parts)])
+    return b"".join(parts)

@@ -3,7 +3,8 @@
 from app.gestures.exchange import export_set, import_set
 from app.gestures.png import read_template, template_png
 from app.gestures.records import Gesture, NewGesture, Sample
-from app.gestures.setfile import read_set, write_set
+from app.gestures.setfile import read_set
+from app.gestures.setwriter import write_set
 from app.gestures.store import GestureStore
 
 __all__ = [

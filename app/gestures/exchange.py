@@ -1,9 +1,11 @@
 """Taking gestures out of a database, and into it, in the exchange format of setfile.py."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from app.gestures.records import SHARED, Gesture, NewGesture
-from app.gestures.setfile import read_set, write_set
+from app.gestures.setfile import read_set
+from app.gestures.setwriter import write_set
 from app.gestures.store import GestureStore
 
 
@@ -17,20 +19,22 @@ def export_set(store: GestureStore, target: Path, gallery: str = SHARED) -> int:
         NotFound: no gallery has this id.
         Invalid: the target exists and is not an empty folder.
     """
-    gestures = store.list(gallery)
-    write_set(
-        (
-            NewGesture(
-                gesture.name,
-                gesture.action,
-                tuple(sample.template for sample in gesture.samples),
-                gesture.active,
-            )
-            for gesture in gestures
-        ),
-        target,
-    )
+    gestures = entries_of(store.list(gallery))
+    write_set(gestures, target)
     return len(gestures)
+
+
+def entries_of(gestures: Iterable[Gesture]) -> list[NewGesture]:
+    """Gestures as a set holds them: without ids and times."""
+    return [
+        NewGesture(
+            gesture.name,
+            gesture.action,
+            tuple(sample.template for sample in gesture.samples),
+            gesture.active,
+        )
+        for gesture in gestures
+    ]
 
 
 def import_set(

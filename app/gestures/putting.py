@@ -1,11 +1,12 @@
 """Gestures into the tables, within a transaction."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from app.errors import Duplicate, Invalid
+from app.gestures.history import Recorder
 from app.gestures.reading import read_gesture
 from app.gestures.records import MAX_GESTURES, Gesture, NewGesture, name_key
 from app.gestures.rows import append, new_id, now_ms, seal_gesture
@@ -19,10 +20,21 @@ def put(
     session: Session,
     home: GalleryRow,
     entries: Sequence[NewGesture],
+    seen: Recorder,
     *,
     replace: bool,
+    progress: Callable[[int], None] | None = None,
 ) -> list[Gesture]:
     """Enrol gestures in a gallery; with ``replace`` over those of the same names.
+
+    Args:
+        base: The database.
+        session: With a transaction for writing.
+        home: The gallery.
+        entries: What to enrol.
+        seen: Writes down what changes.
+        replace: Whether a gesture whose name is taken gets the new action and samples.
+        progress: Told how many are done; what it raises ends the transaction.
 
     Raises:
         Duplicate: a name is taken, and ``replace`` is off.
@@ -41,6 +53,8 @@ def put(
             session.add(row)
         elif not replace:
             check_free(session, home.number, entry.name)
+        else:
+            seen.before(row)
         row.name, row.name_key = entry.name, name_key(entry.name)
         set_action(row, entry.action, now)
         row.active = entry.active
@@ -50,13 +64,32 @@ def put(
         seal_gesture(row)
         session.flush()
         rows.append(row)
+        if progress is not None:
+            progress(len(rows))
+    check_count(session, home)
+    base.rise(session)
+    return [seen.after(read_gesture(base, row)) for row in rows]
+
+
+def check_count(session: Session, home: GalleryRow) -> None:
+    """Refuse what makes a gallery too large.
+
+    Raises:
+        Invalid: there would be too many gestures.
+    """
     count = session.scalar(
         select(func.count()).select_from(GestureRow).where(GestureRow.gallery == home.number)
     )
     if count is not None and count > MAX_GESTURES:
         raise Invalid(f"there would be {count} gestures; at most {MAX_GESTURES} are allowed")
+
+
+def touch(base: Transactions, session: Session, row: GestureRow) -> Gesture:
+    """A gesture was changed: seal it, count the change, and read it back."""
+    row.updated_ms = now_ms()
+    seal_gesture(row)
     base.rise(session)
-    return [read_gesture(base, row) for row in rows]
+    return read_gesture(base, row)
 
 
 def new_gesture(home: GalleryRow, created_ms: int) -> GestureRow:

@@ -3,6 +3,7 @@
 from sqlalchemy import select
 from sqlalchemy.orm import Session, selectinload
 
+from app.errors import NotFound
 from app.gestures.records import ActionVersion, Gesture
 from app.gestures.rows import gesture_of, time_of
 from app.gestures.tables import GalleryRow, GestureRow
@@ -23,6 +24,18 @@ def read_all(base: Transactions, session: Session, gallery: GalleryRow) -> list[
         .options(selectinload(GestureRow.samples))
     )
     return [read_gesture(base, row) for row in rows]
+
+
+def row_of(session: Session, id: str) -> GestureRow:
+    """The row of a gesture.
+
+    Raises:
+        NotFound: no gesture has this id.
+    """
+    row = session.scalar(select(GestureRow).where(GestureRow.id == id))
+    if row is None:
+        raise NotFound(f"there is no gesture with the id {id[:64]!r}", id=id[:64])
+    return row
 
 
 def read_gesture(base: Transactions, row: GestureRow) -> Gesture:

@@ -3,7 +3,7 @@
 import time
 import uuid
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime, timedelta
 
 from app.errors import DatabaseBroken, Invalid
@@ -73,8 +73,13 @@ def append(row: GestureRow, templates: Sequence[bytes], created_ms: int) -> None
             f"the gesture would have {count} samples; at most {MAX_SAMPLES} are allowed",
             field="templates",
         )
-    for template in templates:
-        sample = SampleRow(id=new_id(), template=template, created_ms=created_ms)
+    put_back(row, [(new_id(), template, created_ms) for template in templates])
+
+
+def put_back(row: GestureRow, samples: Iterable[tuple[str, bytes, int]]) -> None:
+    """Add samples as they were: id, template, and time in ms since 1970."""
+    for id, template, created_ms in samples:
+        sample = SampleRow(id=id, template=template, created_ms=created_ms)
         sample.checksum = _of_sample(sample)
         row.samples.append(sample)
 

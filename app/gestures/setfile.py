@@ -14,24 +14,21 @@ are those of :mod:`app.link.actions`. ``active = false`` marks a gesture that is
 matched. Nothing else is allowed: what is misspelt is refused, not ignored.
 """
 
+import io
 import json
 import lzma
-import os
-import re
-import shutil
-import tempfile
 import tomllib
-import unicodedata
 import zipfile
 import zlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 from pydantic import ValidationError
 
 from app.errors import Invalid
-from app.gestures.png import PNG_MAX_BYTES, read_template, template_png
+from app.gestures.png import PNG_MAX_BYTES, read_template
 from app.gestures.records import (
     MAX_GESTURES,
     NewGesture,
@@ -49,6 +46,8 @@ ZIP_MAX_BYTES = 64 << 20
 
 Read = Callable[[str, int], bytes]
 """Gives the bytes of a file in the set by its path; refuses more than the given number."""
+Progress = Callable[[int, int], None]
+"""Told how much is done, of how much; what it raises ends the work."""
 
 
 def read_set(source: Path) -> list[NewGesture]:
@@ -59,13 +58,33 @@ def read_set(source: Path) -> list[NewGesture]:
     """
     if not source.exists():
         raise Invalid(f"{source} does not exist; name a folder with {INDEX} in it, or a zip of one")
-    try:
+    with _plain_errors(source):
         if source.is_dir():
             return _parse(_folder_reader(source))
         if source.stat().st_size > ZIP_MAX_BYTES:
             raise Invalid(f"{source} is larger than {ZIP_MAX_BYTES >> 20} MiB")
         with zipfile.ZipFile(source) as archive:
             return _parse(_zip_reader(archive))
+
+
+def read_zip(data: bytes, progress: Progress | None = None) -> list[NewGesture]:
+    """Read a set of gestures from the bytes of a zip file.
+
+    Args:
+        data: The whole file.
+        progress: Told how many gestures are read, and how many there are.
+
+    Raises:
+        Invalid: damaged, or not exactly in the format; says where and why.
+    """
+    with _plain_errors("the file"), zipfile.ZipFile(io.BytesIO(data)) as archive:
+        return _parse(_zip_reader(archive), progress)
+
+
+@contextmanager
+def _plain_errors(source: object) -> Iterator[None]:
+    try:
+        yield
     except (zipfile.BadZipFile, zlib.error, lzma.LZMAError, NotImplementedError) as error:
         raise _unreadable(source, error) from error
     except (OSError, EOFError, RuntimeError, ValueError) as error:
@@ -74,86 +93,12 @@ def read_set(source: Path) -> list[NewGesture]:
         raise _unreadable(source, error) from error
 
 
-def _unreadable(source: Path, error: Exception) -> Invalid:
+def _unreadable(source: object, error: Exception) -> Invalid:
     reason = " ".join(str(error).split())
     return Invalid(f"{source} is neither a readable folder nor a readable zip file: {reason}")
 
 
-def write_set(gestures: Iterable[NewGesture], target: Path) -> None:
-    """Write a set to a new folder, or to a zip file when ``target`` ends in ``.zip``.
-
-    The same gestures give the same bytes. Whole or not at all: the files are written beside the
-    target and put in place by one renaming.
-
-    Raises:
-        Invalid: the target exists (an empty folder may), or its parent does not.
-        OSError: the disk does not take it.
-    """
-    zipped = target.suffix.lower() == ".zip"
-    if target.exists() and (zipped or not target.is_dir() or any(target.iterdir())):
-        raise Invalid(f"{target} exists already; name a new folder or zip file")
-    if not target.absolute().parent.is_dir():
-        raise Invalid(f"the folder {target.absolute().parent} does not exist; make it first")
-    files = _files(gestures)
-    staging = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.absolute().parent))
-    try:
-        if zipped:
-            path = staging / "set.zip"
-            with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-                for name, data in files.items():
-                    # A fixed time (the format's earliest) keeps equal sets equal to the byte.
-                    archive.writestr(zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0)), data)
-            os.replace(path, target)
-        else:
-            for name, data in files.items():
-                (staging / name).parent.mkdir(exist_ok=True)
-                (staging / name).write_bytes(data)
-            staging.chmod(0o755)
-            os.replace(staging, target)
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
-
-
-def _files(gestures: Iterable[NewGesture]) -> dict[str, bytes]:
-    files: dict[str, bytes] = {}
-    index = [f"format = {FORMAT}\n"]
-    taken: set[str] = set()
-    for gesture in gestures:
-        folder = _slug(gesture.name, taken)
-        digits = max(2, len(str(len(gesture.templates))))
-        samples = [f"{folder}/{n:0{digits}}.png" for n in range(1, len(gesture.templates) + 1)]
-        files.update(zip(samples, map(template_png, gesture.templates), strict=True))
-        action = ACTION.dump_python(gesture.action, mode="json", exclude_none=True)
-        index.append(
-            f"\n[[gesture]]\nname = {_toml(gesture.name)}\naction = {_toml(action)}\n"
-            f"{'' if gesture.active else f'active = false{chr(10)}'}"
-            f"samples = [\n{''.join(f'  {_toml(sample)},{chr(10)}' for sample in samples)}]\n"
-        )
-    return {INDEX: "".join(index).encode(), **files}
-
-
-def _slug(name: str, taken: set[str]) -> str:
-    """A file name of a to z, 0 to 9 and hyphens that is not in ``taken``, and is then."""
-    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode().lower()
-    base = re.sub(r"[^a-z0-9]+", "-", plain).strip("-") or "gesture"
-    slug, number = base, 1
-    while slug in taken:
-        number += 1
-        slug = f"{base}-{number}"
-    taken.add(slug)
-    return slug
-
-
-def _toml(value: Any) -> str:
-    """A value in TOML on one line. JSON's strings, numbers and words are TOML's, too."""
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + " }"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    return json.dumps(value, ensure_ascii=False)
-
-
-def _parse(read: Read) -> list[NewGesture]:
+def _parse(read: Read, progress: Progress | None = None) -> list[NewGesture]:
     try:
         index = tomllib.loads(read(INDEX, INDEX_MAX_BYTES).decode())
     except (ValueError, RecursionError) as error:
@@ -178,6 +123,8 @@ def _parse(read: Read) -> list[NewGesture]:
                 f"{INDEX}, gesture {number}: the name {gesture.name!r} is taken by {first!r}"
             )
         gestures.append(gesture)
+        if progress is not None:
+            progress(number, len(tables))
     return gestures
 
 

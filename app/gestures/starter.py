@@ -14,7 +14,7 @@ from app.gestures.hand.poses import ALSO, POSES
 from app.gestures.hand.render import HandLook, HandView, render_hand
 from app.gestures.hand.skin import TONES
 from app.gestures.records import TEMPLATE_HEIGHT, TEMPLATE_WIDTH, NewGesture
-from app.gestures.setfile import write_set
+from app.gestures.setwriter import write_set
 from app.link.actions import Action, Gripper, Home, JogCartesian, Stop
 
 Extract = Callable[[bytes], NDArray[np.uint8]]

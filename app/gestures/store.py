@@ -7,13 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from sqlalchemy import URL, func, select
-from sqlalchemy.orm import Session
 
 from app.errors import CannotStart, DatabaseBroken, FarhandError, Invalid, NotFound
 from app.gestures import database
 from app.gestures.galleries import Galleries
-from app.gestures.putting import check_free, put, teaching_ms
-from app.gestures.reading import read_all, read_gesture, read_version
+from app.gestures.history import History, Recorder
+from app.gestures.putting import check_free, put, teaching_ms, touch
+from app.gestures.reading import read_all, read_gesture, read_version, row_of
 from app.gestures.records import (
     SHARED,
     ActionVersion,
@@ -23,10 +23,12 @@ from app.gestures.records import (
     clean_name,
     name_key,
 )
-from app.gestures.rows import append, ms_of, now_ms, seal_gallery, seal_gesture
+from app.gestures.rows import append, ms_of, now_ms, seal_gallery
+from app.gestures.samples import Samples
 from app.gestures.setfile import read_set
 from app.gestures.tables import GestureRow
 from app.gestures.transactions import Transactions
+from app.gestures.undoing import undo
 from app.gestures.versions import check_version, set_action
 from app.link.actions import Action
 
@@ -56,6 +58,8 @@ class GestureStore:
     ) -> None:
         self.base = Transactions(url)
         self.galleries = Galleries(self.base)
+        self.history = History(self.base)
+        self.samples = Samples(self.base, self.history)
         try:
             self._open(starter, actions or {})
         except BaseException as error:
@@ -82,7 +86,8 @@ class GestureStore:
                     for entry in entries
                 ]
                 shared = self.galleries.row(session, SHARED)
-                gestures = put(self.base, session, shared, entries, replace=False)
+                nobody = Recorder(self.base, None)
+                gestures = put(self.base, session, shared, entries, nobody, replace=False)
                 if gestures:
                     # Nobody has taught these.
                     shared.created_ms = ms_of(gestures[-1].created)
@@ -132,7 +137,7 @@ class GestureStore:
             NotFound: no gesture has this id.
         """
         with self.base.read() as session:
-            return read_gesture(self.base, self._row(session, id))
+            return read_gesture(self.base, row_of(session, id))
 
     def templates(self, gallery: str = SHARED) -> builtins.list[tuple[str, bytes]]:
         """Name and template (600 bytes) of every active sample, in a stable order.
@@ -155,6 +160,7 @@ class GestureStore:
         *,
         active: bool = True,
         gallery: str = SHARED,
+        undo_as: str | None = None,
     ) -> Gesture:
         """Enrol a gesture.
 
@@ -164,6 +170,7 @@ class GestureStore:
             templates: At least one, 600 bytes each.
             active: Whether it is matched from now on.
             gallery: Id of the gallery that it belongs to.
+            undo_as: Id under which :meth:`undo` can take it back.
 
         Raises:
             NotFound: no gallery has this id.
@@ -172,9 +179,9 @@ class GestureStore:
             StorageFull: no space is left; nothing was changed.
         """
         entry = NewGesture(clean_name(name), action, check_templates(templates), active)
-        with self.base.write() as session:
+        with self.history.recording("enrol", undo_as) as seen, self.base.write() as session:
             home = self.galleries.row(session, gallery)
-            return put(self.base, session, home, [entry], replace=False)[0]
+            return put(self.base, session, home, [entry], seen, replace=False)[0]
 
     def put_all(
         self, entries: Sequence[NewGesture], *, replace: bool = False, gallery: str = SHARED
@@ -198,7 +205,8 @@ class GestureStore:
         ]
         with self.base.write() as session:
             home = self.galleries.row(session, gallery)
-            return put(self.base, session, home, checked, replace=replace)
+            nobody = Recorder(self.base, None)
+            return put(self.base, session, home, checked, nobody, replace=replace)
 
     def update(
         self,
@@ -208,6 +216,7 @@ class GestureStore:
         action: Action | None = None,
         active: bool | None = None,
         version: int | None = None,
+        undo_as: str | None = None,
     ) -> Gesture:
         """Change a gesture's name, its action, or whether it is matched; None leaves it.
 
@@ -220,6 +229,7 @@ class GestureStore:
             active: Whether it is matched from now on.
             version: What the caller takes for the newest version of the action; nothing is changed
                 when it is not.
+            undo_as: As in :meth:`create`.
 
         Raises:
             NotFound: no gesture has this id.
@@ -227,9 +237,10 @@ class GestureStore:
             Invalid, Duplicate: as in :meth:`create`.
         """
         clean = None if name is None else clean_name(name)
-        with self.base.write() as session:
-            row = self._row(session, id)
+        with self.history.recording("change", undo_as) as seen, self.base.write() as session:
+            row = row_of(session, id)
             check_version(row, version)
+            seen.before(row)
             if clean is not None:
                 check_free(session, row.gallery, clean, besides=row.number)
                 row.name, row.name_key = clean, name_key(clean)
@@ -237,7 +248,7 @@ class GestureStore:
                 set_action(row, action, now_ms())
             if active is not None:
                 row.active = active
-            return self._touch(session, row)
+            return seen.after(touch(self.base, session, row))
 
     def versions(self, id: str) -> builtins.list[ActionVersion]:
         """The actions that a gesture had, oldest first; the last is in force.
@@ -246,28 +257,36 @@ class GestureStore:
             NotFound: no gesture has this id.
         """
         with self.base.read() as session:
-            row = self._row(session, id)
+            row = row_of(session, id)
             return [read_version(self.base, row, number) for number in range(len(row.versions))]
 
-    def restore(self, id: str, version: int) -> Gesture:
+    def restore(self, id: str, version: int, *, undo_as: str | None = None) -> Gesture:
         """Give a gesture the action that it had as ``version``, as its newest version.
 
         Raises:
             NotFound: no gesture has this id, or it has no such version.
         """
-        with self.base.write() as session:
-            row = self._row(session, id)
+        with self.history.recording("change", undo_as) as seen, self.base.write() as session:
+            row = row_of(session, id)
+            seen.before(row)
             for number, former in enumerate(row.versions):
                 if former.version == version:
                     set_action(row, read_version(self.base, row, number).action, now_ms())
-                    return self._touch(session, row)
+                    return seen.after(touch(self.base, session, row))
             raise NotFound(
                 f"{row.name} has no version {version} of its action; the newest is {row.version}",
                 version=version,
                 newest=row.version,
             )
 
-    def add_samples(self, id: str, templates: Sequence[bytes], *, replace: bool = False) -> Gesture:
+    def add_samples(
+        self,
+        id: str,
+        templates: Sequence[bytes],
+        *,
+        replace: bool = False,
+        undo_as: str | None = None,
+    ) -> Gesture:
         """Enrol more pictures of a gesture, or with ``replace`` others in place of all so far.
 
         Raises:
@@ -275,33 +294,26 @@ class GestureStore:
             Invalid: a template is not one, or there would be more than 1000.
         """
         checked = check_templates(templates)
-        with self.base.write() as session:
-            row = self._row(session, id)
+        with self.history.recording("samples", undo_as) as seen, self.base.write() as session:
+            row = row_of(session, id)
+            seen.before(row)
             if replace:
                 row.samples.clear()
             append(row, checked, teaching_ms(row.home))
-            return self._touch(session, row)
+            return seen.after(touch(self.base, session, row))
 
-    def delete(self, id: str) -> None:
+    def delete(self, id: str, *, undo_as: str | None = None) -> None:
         """Forget a gesture and its samples.
 
         Raises:
             NotFound: no gesture has this id.
         """
-        with self.base.write() as session:
-            session.delete(self._row(session, id))
+        with self.history.recording("delete", undo_as) as seen, self.base.write() as session:
+            row = row_of(session, id)
+            seen.before(row)
+            session.delete(row)
             self.base.rise(session)
 
-    # -- inside a transaction ------------------------------------------------------------------
-
-    def _touch(self, session: Session, row: GestureRow) -> Gesture:
-        row.updated_ms = now_ms()
-        seal_gesture(row)
-        self.base.rise(session)
-        return read_gesture(self.base, row)
-
-    def _row(self, session: Session, id: str) -> GestureRow:
-        row = session.scalar(select(GestureRow).where(GestureRow.id == id))
-        if row is None:
-            raise NotFound(f"there is no gesture with the id {id[:64]!r}", id=id[:64])
-        return row
+    def undo(self, id: str, *, undo_as: str | None = None) -> builtins.list[Gesture]:
+        """Take a change back, see :func:`app.gestures.undoing.undo`."""
+        return undo(self.base, self.galleries, self.history, id, undo_as)

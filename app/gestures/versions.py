@@ -1,6 +1,7 @@
 """The actions that a gesture had: each change is a new version, the former ones are kept."""
 
 import zlib
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from pydantic import ValidationError
@@ -19,17 +20,26 @@ class Kept(NamedTuple):
     created_ms: int
 
 
+def keep(row: GestureRow, versions: Sequence[Kept]) -> None:
+    """Give a new row the versions that its gesture had; the newest is in force."""
+    for version, action, created_ms in versions:
+        _append(row, version, ACTION.dump_json(action).decode(), created_ms)
+
+
 def set_action(row: GestureRow, action: Action, now_ms: int) -> None:
     """Make ``action`` the gesture's newest version; the same action again is no new one."""
     if row.versions and _says(row.action, action):
         return
     text = ACTION.dump_json(action).decode()
-    row.action = text
-    row.version += 1
-    kept = ActionVersionRow(version=row.version, action=text, created_ms=now_ms)
+    _append(row, row.version + 1, text, now_ms)
+    del row.versions[:-MAX_VERSIONS]
+
+
+def _append(row: GestureRow, version: int, text: str, created_ms: int) -> None:
+    row.action, row.version = text, version
+    kept = ActionVersionRow(version=version, action=text, created_ms=created_ms)
     kept.checksum = _checksum(kept)
     row.versions.append(kept)
-    del row.versions[:-MAX_VERSIONS]
 
 
 def check_version(row: GestureRow, version: int | None) -> None:

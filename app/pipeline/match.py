@@ -1,6 +1,7 @@
 """PCA match: nearest enrolled template among the principal components, or unknown."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Self
 
@@ -136,6 +137,7 @@ class PcaMatcher:
         self._rows = self._coordinates(rows)
         self._squares: F32 = np.einsum("ij,ij->i", self._rows, self._rows)
         of_template = np.array([self.labels.index(label) for label in labels])
+        self._of_template: NDArray[np.intp] = of_template
         self._starts: NDArray[np.intp] = np.searchsorted(owner, np.arange(len(order)))
         ends = np.searchsorted(of_template, np.arange(len(self.labels)), side="right")
         self._parts = np.split(np.arange(len(order)), ends[:-1])
@@ -219,26 +221,55 @@ class PcaMatcher:
         if not self.labels:
             return Matched(None, {})
         points = self._coordinates(self._features(views) - self._mean)
+        return self._judge(points, self.labels, self._parts)
+
+    def without(self, index: int) -> Matched:
+        """Match an enrolled template as if it were shown, itself left out.
+
+        The components and the largest distance stay those of the whole gallery, so that nothing is
+        fitted anew: what one template of many changes in them is little.
+
+        Args:
+            index: Of the template, in the order of :attr:`templates`.
+
+        Returns:
+            As when matching a hand; without its gesture where that has no other template.
+        """
+        start = self._starts[index]
+        end = self._starts[index + 1] if index + 1 < len(self._starts) else len(self._rows)
+        mine = self._of_template[index]
+        parts = list(self._parts)
+        parts[mine] = parts[mine][parts[mine] != index]
+        kept = [number for number, part in enumerate(parts) if len(part)]
+        if not kept:
+            return Matched(None, {})
+        labels = tuple(self.labels[number] for number in kept)
+        return self._judge(self._rows[start:end], labels, [parts[number] for number in kept])
+
+    def _judge(
+        self, points: F32, labels: tuple[str, ...], parts: Sequence[NDArray[np.intp]]
+    ) -> Matched:
+        """(v, k + 1) coordinates against the templates in ``parts``, one part a label."""
         table = self._to_templates(points)
         nearest = table.min(axis=0)
-        per_label = np.array([self._to_gesture(nearest[part]) for part in self._parts])
-        distances = dict(zip(self.labels, per_label.tolist(), strict=True))
+        per_label = np.array([self._to_gesture(nearest[part]) for part in parts])
+        distances = dict(zip(labels, per_label.tolist(), strict=True))
         best = int(per_label.argmin())
-        distance = distances[self.labels[best]]
+        distance = distances[labels[best]]
         margin: float | None = None
         second: str | None = None
-        if len(self.labels) > 1:
+        if len(labels) > 1:
             others = per_label.copy()
             others[best] = np.inf
             runner_up = int(others.argmin())
-            second = self.labels[runner_up]
+            second = labels[runner_up]
             margin = distances[second] - distance
-        best_view = int(table[:, self._parts[best]].min(axis=1).argmin())
+        best_view = int(table[:, parts[best]].min(axis=1).argmin())
         error = float(points[best_view, -1]) / float(np.sqrt(self._dimensions))
-        cause, reason = self._why_unknown(self.labels[best], distance, second, margin, error)
+        cause, reason = self._why_unknown(labels[best], distance, second, margin, error)
         strangeness = self._strangeness(distance, margin, error)
         match = Match(
-            self.labels[best], distance, margin, error, cause is None, reason, strangeness, cause
+            labels[best], distance, margin, error, cause is None, reason, strangeness, cause
         )
         return Matched(match, distances, Look(points[best_view], nearest, second))
 

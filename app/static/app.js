@@ -313,14 +313,30 @@ async function teach(gesture = null) {
             restore: api.restoreVersion,
             check: (action, from) => api.dryRun(robotId(), action, from),
         },
-        done(text) {
+        async done(text, changes) {
             sheets.close();
-            notices.show(text, { kind: "good" });
             galleries.loadGestures();
+            (await undoing()).did(text, changes);
         },
     });
     const title = gesture ? texts.teach.editTitle(gesture.name) : texts.teach.title;
     sheets.show("teach", title, content, { onclose: close, focus });
+}
+
+let undo = null;
+
+/** What was changed can be taken back. */
+async function undoing() {
+    const { Undo } = await import("./ui/undo.js");
+    undo ||= new Undo({ notices, undo: api.undo });
+    return undo;
+}
+
+async function manage() {
+    const { manager } = await import("./managing.js");
+    const edit = (id) => wishes["edit-gesture"]({ id });
+    const { content, close } = await manager({ store, api, undo: await undoing(), edit });
+    sheets.show("manager", texts.manager.title, content, { onclose: close });
 }
 
 /** Try out what the page needs, and say what is missing and how to mend it. */
@@ -398,6 +414,7 @@ const wishes = {
 root.addEventListener("farhand:want", ({ detail }) => wishes[detail.what](detail));
 byId("help-open").addEventListener("click", wishes.help);
 byId("teach-open").addEventListener("click", () => teach());
+byId("manage-open").addEventListener("click", manage);
 
 window.farhand = inspection({ store, sender, feeds, counts, shown: () => pictures.shown, reading });
 

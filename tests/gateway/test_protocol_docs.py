@@ -12,13 +12,17 @@ from app.errors import FarhandError
 from app.gateway import messages
 from app.gateway.app import create_app
 from app.gateway.errors import _HTTP_CODES
+from app.gateway.jobs import KEPT_S, MOST_KEPT, MOST_RUNNING
 from app.gateway.messages import _CLIENT_MESSAGE
 from app.gateway.uploads import MAX_BURST, MAX_IMAGES
+from app.gestures.history import MAX_BYTES, MAX_CHANGES
 from app.gestures.records import MAX_GALLERIES, MAX_GESTURES
+from app.gestures.setfile import ZIP_MAX_BYTES
 from app.link import actions
 from app.pipeline import STAGES
 from app.pipeline.burst import KEPT, MAX_FRAMES
 from app.pipeline.confusion import LIKELY, POSSIBLE
+from app.pipeline.mix_ups import MOST_ASKED
 from app.pipeline.types import Cause
 
 ROOT = Path(__file__).parents[2]
@@ -110,6 +114,9 @@ def test_the_limits_are_the_settings() -> None:
     assert settings.gateway.max_message_bytes == 1 << 20
     assert settings.gateway.max_upload_bytes == 4 << 20
     assert settings.gateway.max_burst_bytes == 16 << 20
+    assert settings.gateway.max_import_bytes == 16 << 20
+    assert (MOST_RUNNING, KEPT_S, MOST_KEPT) == (2, 600, 20)
+    assert (MAX_CHANGES, MAX_BYTES, MOST_ASKED, ZIP_MAX_BYTES) == (200, 64 << 20, 2000, 64 << 20)
     assert (MAX_IMAGES, MAX_BURST, MAX_FRAMES, KEPT) == (50, 120, 120, 8)
     assert (LIKELY, POSSIBLE) == (0.9, 0.7)
     assert (MAX_GALLERIES, MAX_GESTURES) == (100, 500)

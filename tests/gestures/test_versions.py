@@ -6,6 +6,8 @@ import pytest
 from app.errors import ChangedMeanwhile, DatabaseBroken, NotFound
 from app.gestures import GestureStore, NewGesture
 from app.gestures.exchange import export_set, import_set
+from app.gestures.putting import touch
+from app.gestures.reading import row_of
 from app.gestures.records import MAX_VERSIONS
 from app.link.actions import Gripper, Home, Sequence, Stop, Wait
 from tests.gestures.conftest import execute, template, url
@@ -45,9 +47,9 @@ def test_an_action_stored_without_a_newer_field_is_still_the_same(
 ) -> None:
     made = store.create("a", Gripper(width=0.0), [template()])
     with store.base.write() as session:
-        row = store._row(session, made.id)
+        row = row_of(session, made.id)
         row.action = '{"type":"gripper","width":0.0}'
-        store._touch(session, row)
+        touch(store.base, session, row)
     assert store.update(made.id, action=Gripper(width=0.0)).version == 1
     assert store.update(made.id, action=Gripper(width=0.0, force=5.0)).version == 2
 

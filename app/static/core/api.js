@@ -10,7 +10,11 @@ export class ApiError extends Error {
     }
 }
 
-async function request(method, path, { body, json, timeoutMs = 15000 } = {}) {
+/**
+ * Ask the server; gives the answer's JSON. Where gestures were changed it has `change`, the id to
+ * take that back by. Throws ApiError.
+ */
+export async function request(method, path, { body, json, timeoutMs = 15000 } = {}) {
     const init = { method, credentials: "same-origin", cache: "no-store" };
     if (json !== undefined) {
         init.headers = { "Content-Type": "application/json" };
@@ -31,10 +35,19 @@ async function request(method, path, { body, json, timeoutMs = 15000 } = {}) {
     } catch {
         // 204, or a proxy's own page
     }
-    if (answer.ok) return data;
+    if (answer.ok) {
+        const change = answer.headers.get("Farhand-Change");
+        return change ? Object.assign(data || {}, { change }) : data;
+    }
     const error = (data && data.error) || {};
     throw new ApiError(answer.status, error.code || "http", error.message || "", error.detail);
 }
+
+const CHANGE_MS = 60000;
+
+/** The same for what changes gestures: a large gallery is learned anew before the answer. */
+export const change = (method, path, options = {}) =>
+    request(method, path, { timeoutMs: CHANGE_MS, ...options });
 
 const id = encodeURIComponent;
 
@@ -70,13 +83,13 @@ export const api = Object.freeze({
         const form = inGallery(imageForm(images), gallery);
         form.append("name", name);
         form.append("action", JSON.stringify(action));
-        return request("POST", "api/gestures", { body: form });
+        return change("POST", "api/gestures", { body: form });
     },
     updateGesture: (gesture, changes) =>
-        request("PATCH", `api/gestures/${id(gesture)}`, { json: changes }),
+        change("PATCH", `api/gestures/${id(gesture)}`, { json: changes }),
     versions: (gesture) => request("GET", `api/gestures/${id(gesture)}/versions`),
     restoreVersion: (gesture, version) =>
-        request("POST", `api/gestures/${id(gesture)}/versions/${id(version)}/restore`),
+        change("POST", `api/gestures/${id(gesture)}/versions/${id(version)}/restore`),
     /** Would an action break a limit? Nothing moves. */
     dryRun: (robot, action, from) =>
         request("POST", `api/robots/${id(robot)}/dry-run`, {
@@ -87,13 +100,15 @@ export const api = Object.freeze({
     checkGesture: (images, gallery) =>
         request("POST", "api/gestures/check", { body: inGallery(imageForm(images), gallery) }),
     addSamples: (gesture, images) =>
-        request("POST", `api/gestures/${id(gesture)}/samples`, { body: imageForm(images) }),
+        change("POST", `api/gestures/${id(gesture)}/samples`, { body: imageForm(images) }),
     /** The same, in place of all samples that there are. */
     replaceSamples: (gesture, images) =>
-        request("POST", `api/gestures/${id(gesture)}/samples?replace=true`, {
+        change("POST", `api/gestures/${id(gesture)}/samples?replace=true`, {
             body: imageForm(images),
         }),
-    deleteGesture: (gesture) => request("DELETE", `api/gestures/${id(gesture)}`),
+    /** Take a change of gestures back. */
+    undo: (made) => change("POST", `api/changes/${id(made)}/undo`),
+    deleteGesture: (gesture) => change("DELETE", `api/gestures/${id(gesture)}`),
     recognise(image, gallery) {
         const form = inGallery(new FormData(), gallery);
         form.append("image", image, "still.jpg");

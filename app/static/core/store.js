@@ -29,10 +29,14 @@ export class Store {
         if (this.#dirty.size) this.#schedule();
     }
 
-    /** Call `listener(state)` now, and again after any of `keys` changed. */
+    /** Call `listener(state)` now, and again after any of `keys` changed. Gives what ends it. */
     watch(keys, listener) {
-        this.#listeners.push({ keys, listener });
+        const entry = { keys, listener };
+        this.#listeners.push(entry);
         listener(this.#state);
+        return () => {
+            this.#listeners = this.#listeners.filter((other) => other !== entry);
+        };
     }
 
     #schedule() {

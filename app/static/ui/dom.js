@@ -56,6 +56,18 @@ export function setLabel(buttonElement, label) {
     setText(buttonElement.querySelector(".label"), label);
 }
 
+/** A stylesheet that is not needed at first, before anything that needs it is shown. */
+export async function loadStyles(href) {
+    if (document.querySelector(`link[href="${href}"]`)) return;
+    const link = el("link", { rel: "stylesheet", href });
+    const loaded = new Promise((go) => {
+        link.addEventListener("load", go);
+        link.addEventListener("error", go);
+    });
+    document.head.append(link);
+    await loaded;
+}
+
 export function part(root, name) {
     const found = root.querySelector(`[data-part="${name}"]`);
     if (!found) throw new Error(`no part "${name}" in #${root.id}`);

@@ -33,7 +33,7 @@ function row(gesture, state, element, templateUrl) {
                 el("span", { class: "gesture-name", text: gesture.name }),
                 el("span", {
                     class: "gesture-action",
-                    text: describeAction(gesture.action, state.description),
+                    text: gesture.active === false ? words.retired : describeAction(gesture.action, state.description),
                 }),
             ),
             el("div", { class: "gesture-meter" }, el("span", { class: "bar" }, fill, mark), distance),

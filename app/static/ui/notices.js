@@ -13,13 +13,25 @@ export class Notices {
         this.#host = host;
     }
 
-    /** Show `text`; kind is "info", "good" or "bad". `name` replaces a notice of the same name. */
-    show(text, { kind = "info", name = text, stay = false } = {}) {
+    /**
+     * Show `text`; kind is "info", "good" or "bad". `name` replaces a notice of the same name.
+     * `act` {label, id, run} puts a button into it, which ends it.
+     */
+    show(text, { kind = "info", name = text, stay = false, act = null, stayMs = STAY_MS } = {}) {
         this.clear(name);
         const notice = el(
             "div",
             { class: `notice ${kind}`, data: { name } },
             el("p", { text }),
+            act
+                ? button(act.label, {
+                      id: act.id,
+                      onclick: () => {
+                          notice.remove();
+                          act.run();
+                      },
+                  })
+                : null,
             button("", {
                 class: "round small quiet-button",
                 iconName: "close",
@@ -29,7 +41,15 @@ export class Notices {
         );
         this.#host.append(notice);
         while (this.#host.children.length > MOST) this.#host.firstChild.remove();
-        if (!stay) setTimeout(() => notice.remove(), STAY_MS);
+        if (!stay) this.#later(notice, stayMs);
+    }
+
+    /** Take it away after a while, but not from under somebody's hand. */
+    #later(notice, ms) {
+        setTimeout(() => {
+            if (notice.matches(":hover, :focus-within")) this.#later(notice, STAY_MS);
+            else notice.remove();
+        }, ms);
     }
 
     clear(name) {

@@ -12,7 +12,8 @@ const MOST_THUMBS = 12;
 
 /**
  * Contents for the sheet. `gesture` is null to enrol a new one. `act` does the work and throws
- * ApiError: {create, update, addSamples, remove, versions, restore, check}. `done(text)` closes the sheet.
+ * ApiError: {create, update, addSamples, remove, versions, restore, check}. `done(text, changes)` closes
+ * the sheet; `changes` are the ids to take back by what was changed.
  */
 export function teachContent({ gesture, store, video, grab, act, recognise, templateUrl, done }) {
     const name = el("input", {
@@ -44,6 +45,7 @@ export function teachContent({ gesture, store, video, grab, act, recognise, temp
         onclick: () => run(submit),
     });
     const buttons = [save];
+    const made = []; // changes, also those of a saving that was refused half-way
     let busy = false;
 
     async function run(work) {
@@ -77,8 +79,8 @@ export function teachContent({ gesture, store, video, grab, act, recognise, temp
         if (!form.check()) return refuse("", null);
         if (!gesture) {
             if (!capture.stills.length) return refuse(words.stillsMissing, capture.one);
-            await act.create(wanted, form.value(), capture.stills);
-            return done(words.saved(wanted));
+            const { change } = await act.create(wanted, form.value(), capture.stills);
+            return done(words.saved(wanted), [change]);
         }
         const changes = {};
         if (wanted !== gesture.name) changes.name = wanted;
@@ -87,12 +89,12 @@ export function teachContent({ gesture, store, video, grab, act, recognise, temp
             // Refused when somebody else has changed the action since this sheet was opened.
             if (Number.isInteger(gesture.version)) changes.version = gesture.version;
         }
-        if (Object.keys(changes).length) await act.update(gesture.id, changes);
+        if (Object.keys(changes).length) made.push((await act.update(gesture.id, changes)).change);
         if (capture.stills.length) {
-            await act.addSamples(gesture.id, capture.stills);
+            made.push((await act.addSamples(gesture.id, capture.stills)).change);
             capture.clear();
         }
-        return done(words.saved(wanted));
+        return done(words.saved(wanted), made);
     }
 
     const row = el("div", { class: "row end" }, save);
@@ -130,8 +132,8 @@ export function teachContent({ gesture, store, video, grab, act, recognise, temp
             list: () => act.versions(gesture.id),
             restore: (version) =>
                 run(async () => {
-                    await act.restore(gesture.id, version);
-                    done(texts.check.restored(gesture.name));
+                    const { change } = await act.restore(gesture.id, version);
+                    done(texts.check.restored(gesture.name), [change]);
                 }),
         });
     }
@@ -175,8 +177,8 @@ export function teachContent({ gesture, store, video, grab, act, recognise, temp
             class: "danger",
             onclick: () =>
                 run(async () => {
-                    await act.remove(gesture.id);
-                    done(words.deleted(gesture.name));
+                    const { change } = await act.remove(gesture.id);
+                    done(words.deleted(gesture.name), [change]);
                 }),
         });
         buttons.push(ask, yes, no);

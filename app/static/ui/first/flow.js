@@ -1,7 +1,7 @@
 // The first minutes: choose a picture, check it, teach the gestures, drive once. One sheet, step by step.
 
 import { texts } from "../../texts/en.js";
-import { button, el } from "../dom.js";
+import { button, el, loadStyles } from "../dom.js";
 import { sourceChoices, sourceProblem } from "../operator-view.js";
 import { isDriving } from "../page.js";
 import { checkStep } from "./check.js";
@@ -14,18 +14,6 @@ const words = texts.first;
 const WATCH_MS = 150;
 const DISARM_EVERY_MS = 1000;
 const STYLES = "static/styles/first.css";
-
-/** The step's stylesheet, before anything of it is shown. */
-async function styled() {
-    if (document.querySelector(`link[href="${STYLES}"]`)) return;
-    const link = el("link", { rel: "stylesheet", href: STYLES });
-    const loaded = new Promise((go) => {
-        link.addEventListener("load", go);
-        link.addEventListener("error", go);
-    });
-    document.head.append(link);
-    await loaded;
-}
 
 /**
  * @param host element that wishes are told from
@@ -45,7 +33,7 @@ export class FirstMinutes {
     /** Go on where somebody stands. */
     async open() {
         this.#note = "";
-        await styled();
+        await loadStyles(STYLES);
         this.#next();
     }
 

@@ -1,0 +1,136 @@
+"""REST: a gallery as one file, out and in."""
+
+import asyncio
+import re
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from fastapi import APIRouter, Query, Request
+from starlette.responses import StreamingResponse
+
+from app.gateway.bodies import ZIP_BODY
+from app.gateway.errors import BAD_BODY
+from app.gateway.jobs import Job
+from app.gateway.rest_gestures import hub_of
+from app.gateway.undo_offer import UndoOffer
+from app.gateway.uploads import read_file
+from app.gestures.exchange import entries_of
+from app.gestures.importing import Existing, Plan, import_entries, plan_of
+from app.gestures.setfile import read_zip
+from app.gestures.setwriter import zip_stream
+
+if TYPE_CHECKING:
+    from app.gateway.hub import Hub
+
+router = APIRouter(prefix="/api", tags=["galleries"])
+
+ZIP_TYPES = ("application/zip", "application/x-zip-compressed", "application/octet-stream")
+
+
+@router.get(
+    "/galleries/{id}/export",
+    summary="A gallery as a zip file in the exchange format",
+    response_class=StreamingResponse,
+    responses={
+        200: {"content": {"application/zip": {}}, "description": "the file, as it is made"},
+        404: {"description": "unknown id"},
+    },
+)
+async def export_gallery(request: Request, id: str) -> StreamingResponse:
+    """All its gestures, streamed gesture by gesture. Who hangs up ends it."""
+    store = hub_of(request).store
+    gallery = await asyncio.to_thread(store.galleries.get, id)
+    entries = entries_of(await asyncio.to_thread(store.list, id))
+    plain = re.sub(r"[^a-z0-9]+", "-", gallery.name.lower()).strip("-") or "gestures"
+    stream: Iterator[bytes] = zip_stream(entries)
+    return StreamingResponse(
+        stream,
+        media_type="application/zip",
+        headers={"Content-Disposition": f'attachment; filename="farhand-{plain}.zip"'},
+    )
+
+
+@router.post(
+    "/galleries/{id}/import",
+    status_code=202,
+    summary="Take a zip file in the exchange format into a gallery",
+    openapi_extra={"requestBody": ZIP_BODY},
+    responses={
+        **BAD_BODY,
+        404: {"description": "unknown id"},
+        413: {"description": "too many bytes"},
+        429: {"description": "too much long work at once"},
+    },
+)
+async def start_import(
+    request: Request,
+    id: str,
+    existing: Annotated[
+        Existing, Query(description="what becomes of gestures whose names are taken")
+    ] = "replace",
+    check: Annotated[bool, Query(description="only say what would happen")] = False,
+    plan: Annotated[
+        str | None, Query(max_length=64, description="of the answer to check: do only that")
+    ] = None,
+) -> dict[str, Any]:
+    """A job: reads the whole file first, then takes in all of it or nothing."""
+    hub = hub_of(request)
+    hub.jobs.check_free()
+    await asyncio.to_thread(hub.store.galleries.get, id)
+    data = await read_file(request, hub.settings.gateway.max_import_bytes, ZIP_TYPES)
+    kind: Literal["import", "import_check"] = "import_check" if check else "import"
+
+    async def work(job: Job) -> dict[str, Any]:
+        if check:
+            return await asyncio.to_thread(_check, hub, data, id, existing, job)
+        offer = UndoOffer(hub.store)
+        done = await asyncio.to_thread(_import, hub, data, id, existing, plan, job, offer)
+        await hub.gallery_changed()
+        return {**plan_json(done, existing), "change": offer.made}
+
+    return hub.jobs.start(kind, work).as_json()
+
+
+def _check(hub: "Hub", data: bytes, id: str, existing: Existing, job: Job) -> dict[str, Any]:
+    entries = read_zip(data, job.progress)
+    return {**plan_json(plan_of(hub.store.list(id), entries, existing), existing), "change": None}
+
+
+def _import(
+    hub: "Hub",
+    data: bytes,
+    id: str,
+    existing: Existing,
+    expected: str | None,
+    job: Job,
+    offer: UndoOffer,
+) -> Plan:
+    # Half of the work is reading; the numbers go on from there.
+    entries = read_zip(data, lambda done, total: job.progress(done, 2 * total))
+    read = len(entries)
+    return import_entries(
+        hub.store,
+        entries,
+        existing,
+        gallery=id,
+        expected=expected,
+        progress=lambda done, total: job.progress(read + done, read + total),
+        undo_as=offer.id,
+    )
+
+
+def plan_json(found: Plan, existing: Existing) -> dict[str, Any]:
+    """What importing does, as docs/protocol.md shows it."""
+    return {
+        "plan": found.digest,
+        "existing": existing,
+        "gestures": [
+            {
+                "name": entry.name,
+                "fate": fate,
+                "samples": len(entry.templates),
+                "samples_now": samples_now,
+            }
+            for entry, fate, samples_now in found.steps
+        ],
+    }

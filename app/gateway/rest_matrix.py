@@ -1,0 +1,88 @@
+"""REST: how often the gestures of a gallery are taken for one another."""
+
+import asyncio
+from typing import TYPE_CHECKING, Any
+
+from fastapi import APIRouter, Request
+
+from app.gateway.enrolment import run
+from app.gateway.gallery import Enrolled
+from app.gateway.jobs import Job
+from app.gateway.rest_gestures import hub_of
+from app.pipeline.match import PcaMatcher
+from app.pipeline.mix_ups import Answer, MixUps, answer, asked_of, tally
+
+if TYPE_CHECKING:
+    from app.gateway.hub import Hub
+
+router = APIRouter(prefix="/api", tags=["galleries"])
+
+AT_ONCE = 4
+"""Samples that are shown in one go; a few ms. Between two of these, live frames get their turn."""
+
+
+@router.post(
+    "/galleries/{id}/matrix",
+    status_code=202,
+    summary="Try the gallery's own samples: which are taken for which?",
+    responses={
+        404: {"description": "unknown id"},
+        429: {"description": "too much long work at once"},
+    },
+)
+async def start_matrix(request: Request, id: str) -> dict[str, Any]:
+    """A job: each sample of an active gesture is shown to the matcher, itself left out."""
+    hub = hub_of(request)
+    hub.jobs.check_free()
+    enrolled = await asyncio.to_thread(hub.gallery.of, id)
+    return hub.jobs.start("matrix", lambda job: mix_ups(hub, enrolled, job)).as_json()
+
+
+async def mix_ups(hub: "Hub", enrolled: Enrolled, job: Job) -> dict[str, Any]:
+    """The matrix of what a gallery holds, sample after sample.
+
+    Raises:
+        Cancelled: somebody cancelled the job.
+    """
+    matcher = enrolled.matcher
+    asked = asked_of(matcher)
+    answers: list[Answer] = []
+    for first in range(0, len(asked), AT_ONCE):
+        job.progress(first, len(asked))
+        answers += await run(hub, _answers, matcher, asked[first : first + AT_ONCE])
+    job.progress(len(asked), len(asked))
+    return matrix_json(enrolled, tally([gesture.name for gesture in enrolled.content], answers))
+
+
+def _answers(matcher: PcaMatcher, indices: list[int]) -> list[Answer]:
+    return [answer(matcher, index) for index in indices]
+
+
+def matrix_json(enrolled: Enrolled, found: MixUps) -> dict[str, Any]:
+    """A matrix as docs/protocol.md shows it."""
+    ids = enrolled.ids
+    worst = found.worst
+    return {
+        "gallery": enrolled.gallery,
+        "gestures": [
+            {
+                "id": gesture.id,
+                "name": gesture.name,
+                "samples": len(gesture.samples),
+                "asked": sum(counts) + rejected,
+            }
+            for gesture, counts, rejected in zip(
+                enrolled.content, found.counts, found.rejected, strict=True
+            )
+        ],
+        "counts": found.counts,
+        "rejected": found.rejected,
+        "untested": [ids[name] for name in found.untested],
+        "worst": worst
+        and {
+            **worst._asdict(),
+            "shown": ids[worst.shown],
+            "other": ids[worst.other],
+            "teach": ids[worst.teach],
+        },
+    }
