@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from app.memory import PersonSettings
+
 _GALLERY = {"type": "string", "default": "shared", "description": "id of a gallery"}
 _BURST = {"type": "boolean", "default": False, "description": "frames of a few seconds"}
 _IMAGES = {"type": "array", "items": {"type": "string", "format": "binary"}}
@@ -101,6 +103,10 @@ GALLERY_BODY: dict[str, Any] = {
             }
         }
     },
+}
+SETTINGS_BODY: dict[str, Any] = {
+    "required": True,
+    "content": {"application/json": {"schema": PersonSettings.model_json_schema()}},
 }
 DRY_RUN_BODY: dict[str, Any] = {
     "required": True,

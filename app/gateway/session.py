@@ -101,6 +101,7 @@ class OperatorSession:
         self._keys_age = FrameAge(hub.settings.gateway.max_frame_age_ms, "key press")
         self._keys_told: tuple[int, str | None] | None = None
         self._gallery = GalleryChoice(hub.gallery)
+        self._diary = hub.diary.of_session(self.name)
         self._heard_at = time.monotonic()
         self._leases = LeaseKeeper(self.name, hub.robot, hub.ask, self._silent_s, self.tell)
         self._requests: asyncio.Queue[ClientMessage] = asyncio.Queue(MAX_REQUESTS)
@@ -140,6 +141,7 @@ class OperatorSession:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
             self._gallery.close()
+            self._diary.close()
             await asyncio.shield(self._leases.close())
 
     async def _end(self, task: asyncio.Task[None]) -> None:
@@ -279,6 +281,7 @@ class OperatorSession:
         stale = self._keys_age(jog.tick, 0.0, tick_ms())
         situation = self._situation(self._gallery.enrolled, now, stale, by_keys=False)
         decision = self._keys.decide(jog, situation)
+        self._diary.jog(jog, decision)
         if decision.command is not None:
             self._hub.robot.send(decision.command)
             self._hub.metrics.commands.inc()
@@ -348,6 +351,8 @@ class OperatorSession:
                 ended = self._worker.end(time.monotonic())
                 if ended is not None:
                     self.outbox.put(ended)
+                    if ended["phase"] == "end":
+                        self._diary.ended()
                 continue
             self._slot_filled.clear()
             job, self._slot = self._slot, None
@@ -369,6 +374,7 @@ class OperatorSession:
                 metrics.commands.inc()
             for message in done.messages:
                 self.outbox.put(message)
+            self._diary.saw(job, done)
 
     def _heed_stop(self, running: asyncio.Future[FrameDone]) -> None:
         """A frame has been looked at: if it says stop, stop."""
@@ -389,7 +395,7 @@ class OperatorSession:
     async def _stop(self, reason: str, source: str) -> None:
         self._hub.metrics.stops.labels(source).inc()
         try:
-            await self._hub.stop(self.name, reason)
+            await self._hub.stop(self.name, reason, source)
         except FarhandError as error:
             self.tell(error)
 
