@@ -24,7 +24,7 @@ LOOK_S = 0.1
 """The robot keeps its newest five steps: so many within this time would have to be missed."""
 SIGN_IN_S = 60.0
 """Wrong tokens are told at most this often, with how many there were."""
-PICTURE_S = 1.5
+PICTURE_S = 3.0
 CAMERA = "scene"
 """The camera whose pictures are kept, where a robot has one of this name."""
 

@@ -1,7 +1,9 @@
 """What happens to the robot, seen in the states that it publishes."""
 
 import re
+import time
 from collections import deque
+from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 from app.gateway.diary.snapshots import Snapshots
@@ -10,6 +12,12 @@ from app.link.messages import State, Transition
 
 ASKED = 16
 """Newest requests to stop that a step of the robot is compared with."""
+SILENT_S = 1.0
+"""A robot that is silent for less is not worth telling."""
+STUTTERS_S = 60.0
+"""So long after a silence was told only a longer one is: a machine that is overworked stutters for
+minutes, and must not push everything else out of the timeline."""
+LONG_S = 5.0
 _SOURCE = re.compile(r" \(([^()]*)\)$")
 
 
@@ -49,14 +57,24 @@ class RobotDiary:
         robot: Whose states.
         writer: Where to.
         snapshots: For pictures of stops and faults.
+        clock: Seconds that only rise.
     """
 
-    def __init__(self, robot: Seen, writer: Writer, snapshots: Snapshots) -> None:
+    def __init__(
+        self,
+        robot: Seen,
+        writer: Writer,
+        snapshots: Snapshots,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._clock = clock
         self._robot = robot
         self._writer = writer
         self._snapshots = snapshots
         self._asked: deque[Asked] = deque(maxlen=ASKED)
-        self._online: bool | None = None
+        self._heard: float | None = None
+        """When it spoke last; None before it ever did."""
+        self._silence_told = float("-inf")
         self._controller: str | None = None
         self._fault: int | None = None
         """Token of the fault that lasts."""
@@ -76,9 +94,7 @@ class RobotDiary:
     def look(self) -> None:
         """Tell what is new."""
         state, online = self._robot.state, self._robot.online
-        if online != self._online:
-            self._say_online(online)
-            self._online = online
+        self._say_silence(online)
         if state is None or not online:
             return
         self._say_steps(state)
@@ -92,13 +108,22 @@ class RobotDiary:
             self._writer.finish(self._fault)
             self._fault = None
 
-    def _say_online(self, online: bool) -> None:
-        if online and self._silence is not None:
-            self._writer.finish(self._silence)
-            self._writer.record("robot_back")
-            self._silence = None
-        elif not online and self._online:
-            self._silence = self._writer.record("robot_lost", lasts=True)
+    def _say_silence(self, online: bool) -> None:
+        now = self._clock()
+        if online:
+            self._heard = now
+            if self._silence is not None:
+                self._writer.finish(self._silence)
+                self._writer.record("robot_back")
+                self._silence = None
+            return
+        if self._heard is None or self._silence is not None:
+            return
+        silent_s = now - self._heard
+        stutters = now - self._silence_told < STUTTERS_S
+        if silent_s >= (LONG_S if stutters else SILENT_S):
+            self._silence = self._writer.record("robot_lost", lasts=True, ago_s=silent_s)
+            self._silence_told = now
 
     def _say_steps(self, state: State) -> None:
         steps = state.transitions

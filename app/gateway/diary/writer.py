@@ -72,14 +72,22 @@ class Writer:
         return self._overflown + self._unwritten
 
     def record(
-        self, kind: Kind, /, *, template: bytes | None = None, lasts: bool = False, **data: Any
+        self,
+        kind: Kind,
+        /,
+        *,
+        template: bytes | None = None,
+        lasts: bool = False,
+        ago_s: float = 0.0,
+        **data: Any,
     ) -> int:
-        """Something happens now.
+        """Something happens.
 
         Args:
             kind: What.
             template: 600 bytes, if a hand belongs to it.
             lasts: Whether :meth:`finish` will be called.
+            ago_s: How long ago it began.
             **data: Words and numbers that say more, JSON-compatible.
 
         Returns:
@@ -91,8 +99,9 @@ class Writer:
         if not self._last_ms - SLEW_MS < now < self._last_ms:
             self._last_ms = now
         if lasts:
-            self._began[token] = time.monotonic()
-        if not self._put(NewEvent(token, self._last_ms, kind, data, template)):
+            self._began[token] = time.monotonic() - ago_s
+        at_ms = self._last_ms - round(ago_s * 1000)
+        if not self._put(NewEvent(token, at_ms, kind, data, template)):
             self._overflown += 1
         return token
 

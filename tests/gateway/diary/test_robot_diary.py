@@ -15,7 +15,9 @@ class Told:
         self.events: list[dict[str, Any]] = []
         self.pictures: list[int] = []
 
-    def record(self, kind: str, /, *, lasts: bool = False, **data: Any) -> int:
+    def record(self, kind: str, /, *, lasts: bool = False, ago_s: float = 0.0, **data: Any) -> int:
+        if ago_s:
+            data["ago_s"] = ago_s
         self.events.append({"kind": kind, **data, "open": lasts})
         return len(self.events) - 1
 
@@ -77,8 +79,13 @@ def told() -> Told:
 
 
 @pytest.fixture
-def diary(robot: Robot, told: Told) -> RobotDiary:
-    return RobotDiary(robot, told, told)  # type: ignore[arg-type]
+def clock() -> list[float]:
+    return [100.0]
+
+
+@pytest.fixture
+def diary(robot: Robot, told: Told, clock: list[float]) -> RobotDiary:
+    return RobotDiary(robot, told, told, lambda: clock[0])  # type: ignore[arg-type]
 
 
 def test_what_happened_before_is_not_told(robot: Robot, told: Told, diary: RobotDiary) -> None:
@@ -174,7 +181,7 @@ def test_a_fault_lasts_until_it_is_over(robot: Robot, told: Told, diary: RobotDi
 
 
 def test_silence_and_a_new_node_are_told_and_its_steps_count_from_one(
-    robot: Robot, told: Told, diary: RobotDiary
+    robot: Robot, told: Told, diary: RobotDiary, clock: list[float]
 ) -> None:
     for _ in range(7):
         robot.step("disarmed", "armed")
@@ -182,10 +189,11 @@ def test_silence_and_a_new_node_are_told_and_its_steps_count_from_one(
     robot.says(controller="operator-1")
     diary.look()
     robot.online = False
-    diary.look()
-    diary.look()
+    for _ in range(3):
+        clock[0] += 0.5
+        diary.look()
     assert told.kinds == ["control", "robot_lost"]
-    assert told.events[1]["open"]
+    assert told.events[1] == {"kind": "robot_lost", "ago_s": 1.0, "open": True}
     # Another process with another clock, and a stop that it kept.
     robot.steps, robot.tick = [], 10
     robot.step("disarmed", "stopped", "S1", "hit something (arm) (from before the node started)")
@@ -194,3 +202,26 @@ def test_silence_and_a_new_node_are_told_and_its_steps_count_from_one(
     assert told.kinds == ["control", "robot_lost", "robot_back", "stop", "control"]
     assert not told.events[1]["open"]
     assert told.events[3]["by"] == "robot"
+
+
+def test_a_machine_that_stutters_does_not_fill_the_timeline(
+    robot: Robot, told: Told, diary: RobotDiary, clock: list[float]
+) -> None:
+    def silent(seconds: float) -> None:
+        robot.says()
+        diary.look()
+        robot.online = False
+        for _ in range(round(seconds * 10)):
+            clock[0] += 0.1
+            diary.look()
+
+    for _ in range(20):
+        silent(0.5)
+    assert told.events == []
+    for _ in range(20):
+        silent(1.5)
+    assert told.kinds == ["robot_lost", "robot_back"]
+    silent(5.5)
+    robot.says()
+    diary.look()
+    assert told.kinds == ["robot_lost", "robot_back"] * 2

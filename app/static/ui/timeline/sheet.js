@@ -9,7 +9,7 @@ const words = texts.timeline;
 const STYLES = "static/styles/timeline.css";
 const FRESH_EVERY_MS = 1000;
 const day = new Intl.DateTimeFormat(language, { weekday: "long", day: "numeric", month: "long", year: "numeric" });
-const clock = new Intl.DateTimeFormat(language, { hour: "2-digit", minute: "2-digit", second: "2-digit" });
+const clock = new Intl.DateTimeFormat(language, { hour: "2-digit", minute: "2-digit", second: "2-digit", hourCycle: "h23" });
 
 /** Made once; `open` gives what to show on a sheet. `api` {timeline(), eventUrl()} */
 export class Timeline {
