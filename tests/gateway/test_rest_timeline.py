@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import simplejpeg
 
+from app.config import MemorySettings
 from app.gateway.diary.diary import FILE
 from app.gateway.tokens import TokenStore
 from app.link.messages import Transition
@@ -29,6 +30,7 @@ from tests.gateway.test_rest_galleries import make
 from tests.gateway.test_rest_gestures import JOG, enrol, error
 
 Hand = Callable[..., bytes]
+pytestmark = pytest.mark.timeout(300)
 SLOW_S = 60.0
 """No test here is about speed."""
 
@@ -169,6 +171,7 @@ def test_keys_are_one_event(server: Running) -> None:
 
 
 def test_gestures_are_told_whoever_changes_them(server: Running, hand: Hand) -> None:
+    server.http.timeout = SLOW_S
     wave = enrol(server, "wave", JOG, hand("up")).json()
     taught = event(server, "enrolled", template=True)
     assert taught["data"] == {"gesture": "wave", "gallery": "shared"}
@@ -276,7 +279,5 @@ def test_settings_that_cannot_be_kept_say_so(server: Running, monkeypatch: Any) 
 
 @pytest.mark.parametrize("big", [{"events": 99}, {"bytes": 1000}, {"more": 1}])
 def test_bounds_have_bounds(big: dict[str, int]) -> None:
-    from app.config import MemorySettings
-
     with pytest.raises(ValueError, match="1 validation error"):
         MemorySettings(**big)  # type: ignore[arg-type]
