@@ -548,6 +548,20 @@ class GatewaySettings(_Section):
     viser: bool = Field(default=True, description="serve the live 3D view at /viser/")
 
 
+class MemorySettings(_Section):
+    """What the server remembers of what happened."""
+
+    events: int = Field(
+        default=5000, ge=100, le=1_000_000, description="events that the timeline keeps at most"
+    )
+    bytes: int = Field(
+        default=32 << 20,
+        ge=1 << 20,
+        le=4 << 30,
+        description="bytes of events with their pictures that the timeline keeps at most",
+    )
+
+
 def _data_dir() -> Path:
     base = os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share"
     return Path(base) / "farhand"
@@ -597,3 +611,4 @@ class Settings(BaseSettings):
     pipeline: PipelineSettings = PipelineSettings()
     robot: RobotSettings = RobotSettings()
     gateway: GatewaySettings = GatewaySettings()
+    memory: MemorySettings = MemorySettings()

@@ -19,6 +19,7 @@
         ├── RobotUnavailable      the robot node does not answer
         ├── DatabaseBroken        the gesture database cannot be read
         │   └── ForeignDatabase   it is sound, but of a newer Farhand or of something else
+        ├── MemoryUnavailable     the timeline and people's settings cannot be read or written
         ├── StorageFull           no space left to write to
         ├── CannotStart           a port, folder or model that is needed is missing or taken
         └── LinkFailed            the link between gateway and node cannot be opened
@@ -155,6 +156,12 @@ class DatabaseBroken(WorldError):
 
 class ForeignDatabase(DatabaseBroken):
     """A database of a newer Farhand or of something else: sound, and not ours to set aside."""
+
+
+class MemoryUnavailable(WorldError):
+    """The timeline and people's settings cannot be read or written; driving needs neither."""
+
+    default_code = "memory_unavailable"
 
 
 class StorageFull(WorldError):

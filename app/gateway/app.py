@@ -26,6 +26,8 @@ from app.gateway import (
     rest_robots,
     rest_samples,
     rest_server,
+    rest_settings,
+    rest_timeline,
     trust,
     viser_proxy,
 )
@@ -127,6 +129,7 @@ def create_app(
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         async with Hub.open(settings, is_ending) as hub:
             app.state.hub = hub
+            hub.diary.watch_sign_ins(lambda: gatekeeper.throttle.wrong)
             watch = asyncio.create_task(gatekeeper.connections.watch())
             try:
                 yield
@@ -154,6 +157,7 @@ def create_app(
         trust.router,
         rest_gestures.router,
         rest_galleries.router,
+        rest_settings.router,
         rest_programs.router,
         rest_samples.router,
         rest_exchange.router,
@@ -164,6 +168,7 @@ def create_app(
         cameras.router,
         cameras.sockets,
         rest_server.router,
+        rest_timeline.router,
         viser_proxy.router,
     ):
         app.include_router(router)

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from app.memory import PersonSettings
+
 _GALLERY = {"type": "string", "default": "shared", "description": "id of a gallery"}
 _BURST = {"type": "boolean", "default": False, "description": "frames of a few seconds"}
 _IMAGES = {"type": "array", "items": {"type": "string", "format": "binary"}}
@@ -118,6 +120,10 @@ MOVE_BODY: dict[str, Any] = {
 ZIP_BODY: dict[str, Any] = {
     "required": True,
     "content": {"application/zip": {"schema": {"type": "string", "format": "binary"}}},
+}
+SETTINGS_BODY: dict[str, Any] = {
+    "required": True,
+    "content": {"application/json": {"schema": PersonSettings.model_json_schema()}},
 }
 DRY_RUN_BODY: dict[str, Any] = {
     "required": True,

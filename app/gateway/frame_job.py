@@ -4,6 +4,8 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from app.config import Settings
 from app.gateway.detail import detail, glass
 from app.gateway.drive import Decision, Driver, Situation
@@ -38,6 +40,8 @@ class FrameDone:
     messages: tuple[dict[str, Any], ...]
     decision: Decision
     timing_ms: dict[str, float]
+    template: bytes | None = None
+    """600 bytes: the hand with which a gesture starts."""
 
 
 class FrameWorker:
@@ -92,11 +96,13 @@ class FrameWorker:
             frame["detail"] = detail(result, job.enrolled)
         if job.detail and job.glass:
             frame["detail"]["glass"] = glass(result, job.enrolled, self._settings.pipeline)
-        messages = [frame]
+        messages, template = [frame], None
         if result.event is not None:
             event = result.event
             messages.append(gesture_message(event.gesture, event.phase, event.seq))
-        return FrameDone(tuple(messages), decision, timing)
+            if event.phase == "start" and result.template is not None:
+                template = np.packbits(result.template).tobytes()
+        return FrameDone(tuple(messages), decision, timing, template)
 
     def end(self, now: float) -> dict[str, Any] | None:
         """Frames stopped coming: the ``gesture`` message that ends a held one, once it is due."""

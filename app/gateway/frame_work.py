@@ -7,6 +7,7 @@ from concurrent.futures import Executor
 
 from app.errors import FrameRefused
 from app.gateway.bad_messages import BadMessages
+from app.gateway.diary.session import SessionDiary
 from app.gateway.frame_job import FrameDone, FrameWorker
 from app.gateway.frame_slot import FrameSlot
 from app.gateway.metrics import Metrics
@@ -26,6 +27,7 @@ class FrameWork:
         counted: Where good and bad frames are counted.
         metrics: Of the whole server.
         stop: Called with reason and source when a frame says stop; must not wait.
+        diary: Notes what was seen.
     """
 
     def __init__(
@@ -37,6 +39,7 @@ class FrameWork:
         counted: BadMessages,
         metrics: Metrics,
         stop: Callable[[str, str], None],
+        diary: SessionDiary,
     ) -> None:
         self._slot = slot
         self._worker = worker
@@ -45,6 +48,7 @@ class FrameWork:
         self._counted = counted
         self._metrics = metrics
         self._stop = stop
+        self._diary = diary
 
     async def run(self) -> None:
         """Work for ever.
@@ -59,6 +63,8 @@ class FrameWork:
                 ended = self._worker.end(time.monotonic())
                 if ended is not None:
                     self._outbox.put(ended)
+                    if ended["phase"] == "end":
+                        self._diary.ended()
                 continue
             running = loop.run_in_executor(self._images, self._worker.run, job)
             running.add_done_callback(self._heed_stop)
@@ -75,6 +81,7 @@ class FrameWork:
                 self._metrics.commands.inc()
             for message in done.messages:
                 self._outbox.put(message)
+            self._diary.saw(job, done)
 
     def _heed_stop(self, running: asyncio.Future[FrameDone]) -> None:
         """A frame has been looked at: if it says stop, stop."""

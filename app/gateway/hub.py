@@ -8,13 +8,14 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from importlib.metadata import PackageNotFoundError, version
 
 from app.config import Settings
-from app.errors import DatabaseBroken, NotAllowed
+from app.errors import DatabaseBroken, NotAllowed, RobotUnavailable
 from app.gateway.backup_keeper import BackupKeeper
+from app.gateway.diary import Diary
 from app.gateway.gallery import LiveGallery, open_for_server, place_of
 from app.gateway.jobs import Jobs
 from app.gateway.lease_keeper import check_reply
 from app.gateway.metrics import Metrics
-from app.gateway.numbers import Counter
+from app.gateway.numbers import Counter, tick_ms
 from app.gateway.operator_ws import tell_robot, watch_gallery
 from app.gateway.people import People
 from app.gateway.relay import Relay
@@ -68,6 +69,9 @@ class Hub:
         limits = settings.gateway
         self.people = People(robot, limits.max_sessions, limits.max_observers)
         self.relay = Relay(robot, lambda name: self.metrics.pictures.labels(name).inc())
+        self.diary = Diary(
+            settings.data_dir, settings.memory, robot, self.relay, store, self._tell_timeline
+        )
         self.closing = asyncio.Event()
         self.checking = asyncio.Lock()
         """Held while a program is being checked."""
@@ -119,7 +123,11 @@ class Hub:
                 and not is_ending()
             ):
                 await asyncio.sleep(0.02)
-            tasks = [asyncio.create_task(tell_robot(hub)), asyncio.create_task(watch_gallery(hub))]
+            tasks = [
+                asyncio.create_task(tell_robot(hub)),
+                asyncio.create_task(watch_gallery(hub)),
+                asyncio.create_task(hub.diary.run(hub.version)),
+            ]
             try:
                 yield hub
             finally:
@@ -130,6 +138,7 @@ class Hub:
 
     async def _close(self) -> None:
         await self.jobs.close()
+        await self.diary.close()
         await self.relay.close()
         for pool in (self._link_threads, self._stop_threads):
             pool.shutdown(wait=False, cancel_futures=True)
@@ -143,8 +152,13 @@ class Hub:
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(self._link_threads, self.robot.ask, request)
 
-    async def stop(self, source: str, reason: str) -> None:
+    async def stop(self, source: str, reason: str, by: str = "rest") -> None:
         """Stop the robot (category S1) and wait until it confirms.
+
+        Args:
+            source: Who asks.
+            reason: Why, in plain words.
+            by: How it was asked for: ``button``, ``gesture`` or ``rest``.
 
         Raises:
             RobotUnavailable: it was not confirmed in time.
@@ -152,7 +166,13 @@ class Hub:
         request = StopRequest(source=source[:80], reason=reason[:300])
         timeout_s = self.settings.gateway.stop_confirm_ms / 1000
         loop = asyncio.get_running_loop()
-        await loop.run_in_executor(self._stop_threads, self.robot.stop, request, timeout_s)
+        stopping = loop.run_in_executor(self._stop_threads, self.robot.stop, request, timeout_s)
+        self.diary.robot.asked(request.source, request.reason, by)
+        try:
+            await stopping
+        except RobotUnavailable:
+            self.diary.robot.unconfirmed(request.source, by)
+            raise
 
     async def reset(self, source: str) -> None:
         """Leave the latched stop; moves nothing.
@@ -182,6 +202,7 @@ class Hub:
         if current != self._told_version:
             self._told_version = current
             self.keeper.changed()
+            self.diary.gestures.changed()
             self._tell_gallery()
 
     async def tend_database(self) -> None:
@@ -213,6 +234,11 @@ class Hub:
         for session in tuple(self.people.sessions):
             session.tell_gallery()
 
+    def _tell_timeline(self, newest: int) -> None:
+        message = {"type": "timeline", "tick": tick_ms(), "newest": newest}
+        for session in self.people.sessions:
+            session.outbox.put(message)
+
     def _live_values(self) -> Iterable[tuple[str, str, float | None]]:
         robot = self.robot
         state = robot.state
@@ -231,6 +257,7 @@ class Hub:
             "Galleries with a matcher: those in use, and a few that were lately",
             float(self.gallery.fitted),
         )
+        yield "farhand_timeline_lost", "Events that were not written", float(self.diary.lost)
         if state is not None:
             yield "farhand_node_stops", "Stops the node received", float(state.stops)
             dropped = float(sum(state.dropped.values()))

@@ -42,9 +42,10 @@ SERVER_MESSAGES = (
     "people",
     "pong",
     "jog",
+    "timeline",
     "error",
 )
-NEWEST_WINS = frozenset({"frame", "robot", "gallery", "people", "pong", "jog"})
+NEWEST_WINS = frozenset({"frame", "robot", "gallery", "people", "pong", "jog", "timeline"})
 
 
 class _ClientMessage(BaseModel):

@@ -43,11 +43,16 @@ ROUTES: dict[str, Access] = {
     "GET /api/gestures/{id}/versions": "signed in",
     "GET /api/galleries": "signed in",
     "GET /api/galleries/{id}/export": "signed in",
+    "GET /api/galleries/{id}/settings": "signed in",
     "GET /api/robots": "signed in",
     "GET /api/robots/{id}": "signed in",
     "GET /api/cameras": "signed in",
     "GET /api/cameras/{name}.jpg": "signed in",
     "GET /api/cameras/{name}.mjpeg": "signed in",
+    "GET /api/timeline": "signed in",  # of sign-ins that failed, operators alone
+    "GET /api/timeline.jsonl": "signed in",
+    "GET /api/timeline/{id}/picture.jpg": "signed in",
+    "GET /api/timeline/{id}/template.png": "signed in",
     "WEBSOCKET /ws/camera/{name}": "signed in",
     "WEBSOCKET /ws/operator": "signed in",  # what may be sent there: MESSAGES
     "GET /viser": "signed in",
@@ -74,6 +79,7 @@ ROUTES: dict[str, Access] = {
     "POST /api/galleries/{id}/matrix": "operator",
     "GET /api/jobs/{id}": "operator",
     "DELETE /api/jobs/{id}": "operator",
+    "PATCH /api/galleries/{id}/settings": "operator",
     "POST /api/robots/{id}/dry-run": "operator",
 }
 

@@ -77,8 +77,9 @@ class OperatorSession:
         self._socket = socket
         self._settings = hub.settings
         metrics = hub.metrics
+        self._diary = hub.diary.of_session(self.name)
         self._stops = Stops(
-            lambda reason, source: hub.stop(self.name, reason),
+            lambda reason, source: hub.stop(self.name, reason, source),
             lambda source: metrics.stops.labels(source).inc(),
             self.tell,
         )
@@ -95,6 +96,7 @@ class OperatorSession:
             hub.robot,
             self.outbox,
             metrics,
+            self._diary,
         )
         self._slot = FrameSlot(
             role, hub.settings, metrics, lambda: self._gallery.enrolled, self._situation_of_frame
@@ -109,6 +111,7 @@ class OperatorSession:
             self._counted,
             metrics,
             self._stops.begin,
+            self._diary,
         )
         self._requests: asyncio.Queue[ClientMessage] = asyncio.Queue(MAX_REQUESTS)
         self._arrivals = 0
@@ -136,6 +139,7 @@ class OperatorSession:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
             self._gallery.close()
+            self._diary.close()
             await asyncio.shield(self._leases.close())
 
     async def _end(self, task: asyncio.Task[None]) -> None:

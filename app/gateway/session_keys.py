@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from app.gateway.diary.session import SessionDiary
 from app.gateway.drive import Situation
 from app.gateway.frame_age import FrameAge
 from app.gateway.held_keys import HeldKeys
@@ -27,16 +28,24 @@ class SessionKeys:
         robot: Who is commanded.
         outbox: Where it is said that nothing comes of a key, and why.
         metrics: Counts the commands.
+        diary: Notes them.
     """
 
     def __init__(
-        self, keys: HeldKeys, max_age_ms: int, robot: RobotPort, outbox: Outbox, metrics: Metrics
+        self,
+        keys: HeldKeys,
+        max_age_ms: int,
+        robot: RobotPort,
+        outbox: Outbox,
+        metrics: Metrics,
+        diary: SessionDiary,
     ) -> None:
         self._keys = keys
         self._age = FrameAge(max_age_ms, "key press")
         self._robot = robot
         self._outbox = outbox
         self._metrics = metrics
+        self._diary = diary
         self._at = float("-inf")
         self._told: tuple[int, str | None] | None = None
 
@@ -54,6 +63,7 @@ class SessionKeys:
         """
         now = self._at = time.monotonic()
         decision = self._keys.decide(jog, situate(now, self._age(jog.tick, 0.0, tick_ms())))
+        self._diary.jog(jog, decision)
         if decision.command is not None:
             self._robot.send(decision.command)
             self._metrics.commands.inc()

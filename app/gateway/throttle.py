@@ -51,6 +51,8 @@ class Throttle:
         self._refilled = clock()
         self._addresses: OrderedDict[str, _Own] = OrderedDict()
         self._known: OrderedDict[tuple[str, str], None] = OrderedDict()
+        self.wrong = 0
+        """Wrong tokens so far; the same from the same address once."""
 
     def check(self, address: str, digest: str) -> None:
         """Refuse an address that has guessed too often.
@@ -84,6 +86,7 @@ class Throttle:
         if digest in own.wrong:
             return
         own.wrong.add(digest)
+        self.wrong += 1
         own.last = self._clock()
         self._left = max(0.0, self._left - 1.0)
         if len(self._addresses) > MAX_KEPT:

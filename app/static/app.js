@@ -18,6 +18,7 @@ import { PictureReport } from "./core/picture-report.js";
 import { preflight } from "./core/preflight.js";
 import { SourceKeeper } from "./core/source-keeper.js";
 import { ServerClock } from "./core/server-clock.js";
+import { SettingsKeeper } from "./core/settings.js";
 import { Stopper } from "./core/stopper.js";
 import { Store } from "./core/store.js";
 import { texts } from "./texts/en.js";
@@ -37,7 +38,7 @@ import { preflightContent } from "./ui/preflight.js";
 import { readout } from "./ui/readout.js";
 import { sentence } from "./ui/sentence.js";
 import { askContent, goneContent, helpContent, Sheets } from "./ui/sheets.js";
-import { knownSpeed, speed, speedOf } from "./ui/speed.js";
+import { knownSpeed, safeSpeed, speed, speedOf } from "./ui/speed.js";
 import { stage } from "./ui/stage.js";
 import { Starting } from "./ui/starting.js";
 import { whoseBar } from "./ui/whose-bar.js";
@@ -49,6 +50,7 @@ preparePage(document);
 const store = new Store(INITIAL_STATE);
 const link = new OperatorLink();
 const galleries = new GalleryKeeper(link, api, store, memory);
+const settings = new SettingsKeeper(api, store, memory);
 const robotId = () => {
     const robot = store.state.hello && store.state.hello.robot;
     return robot && typeof robot === "object" ? robot.id : robot || null;
@@ -97,7 +99,7 @@ const pressed = keys(root, {
     canMove: () => Boolean(store.state.robot && store.state.robot.armed),
     jog: { down: (event) => jog.down(event), up: (event) => jog.up(event) },
 });
-const views = stage(byId("stage"), store, { feeds, onFrame: pressed.listen, memory });
+const views = stage(byId("stage"), store, { feeds, onFrame: pressed.listen, memory: settings });
 const reading = () => latency.reading(performance.now(), byId("stage").dataset.large);
 latencyBar(byId("stage"), reading);
 
@@ -277,10 +279,19 @@ function sendSpeed() {
 
 function setSpeed(changes) {
     store.set(changes);
-    memory.set("speed", String(store.state.speed));
-    memory.set("fine", store.state.fine ? "yes" : "no");
+    settings.set("speed", String(store.state.speed));
+    settings.set("fine", store.state.fine ? "yes" : "no");
     sendSpeed();
 }
+
+/** What the person chose on another computer has come. */
+settings.addEventListener("loaded", () => {
+    const { speed, fine } = safeSpeed(store.state, memory);
+    store.set({ speed, fine, glass: memory.get("glass") === "open" });
+    sendSpeed();
+    sendView();
+    views.recall();
+});
 
 setInterval(() => {
     const { latencyMs, rate, width, height } = sender;
@@ -339,6 +350,19 @@ async function manage() {
     sheets.show("manager", texts.manager.title, content, { onclose: close });
 }
 
+let timeline = null;
+
+async function showTimeline() {
+    if (sheets.name === "timeline") {
+        sheets.close();
+        return;
+    }
+    const { Timeline } = await import("./ui/timeline/sheet.js");
+    timeline ||= new Timeline(store, api);
+    const { content, focus, close } = await timeline.open();
+    sheets.show("timeline", texts.timeline.open, content, { onclose: close, focus });
+}
+
 /** Try out what the page needs, and say what is missing and how to mend it. */
 async function checkBrowser() {
     const { content, show, done } = preflightContent();
@@ -384,7 +408,10 @@ const wishes = {
     first: () => starting.first(),
     whose: () => starting.whose(),
     reset,
-    source: (wanted) => starting.choose(wanted),
+    source: (wanted) => {
+        settings.set("source", wanted.kind);
+        starting.choose(wanted);
+    },
     swap: () => views.swap(),
     "toggle-control": () => control.toggle(),
     "keep-control": () => link.send("keep_control"),
@@ -392,7 +419,7 @@ const wishes = {
     "toggle-arm": toggleArm,
     glass: ({ open }) => {
         store.set({ glass: open });
-        memory.set("glass", open ? "open" : "folded");
+        settings.set("glass", open ? "open" : "folded");
         sendView();
     },
     "toggle-fine": () => {
@@ -413,6 +440,8 @@ const wishes = {
 
 root.addEventListener("farhand:want", ({ detail }) => wishes[detail.what](detail));
 byId("help-open").addEventListener("click", wishes.help);
+byId("timeline-open").setAttribute("aria-label", texts.timeline.open);
+byId("timeline-open").addEventListener("click", showTimeline);
 byId("teach-open").addEventListener("click", () => teach());
 byId("manage-open").addEventListener("click", manage);
 

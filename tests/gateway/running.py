@@ -207,6 +207,7 @@ class StandIn:
         self.holder: str | None = None
         self.epoch = 0
         self.frame: int | None = None
+        self.steps = (Transition(number=1, tick=5, before="disarmed", after="armed"),)
         self._end = NodeEnd(robot, self.endpoint)
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, name="stand-in")
@@ -288,7 +289,7 @@ class StandIn:
             tool_orientation=(1.0, 0.0, 0.0, 0.0),
             frame=self.frame,
             clearance=NEAR,
-            transitions=(Transition(number=1, tick=5, before="disarmed", after="armed"),),
+            transitions=self.steps,
             dropped={"epoch": 3},
         )
 

@@ -19,6 +19,7 @@ from app.gestures.history import MAX_BYTES, MAX_CHANGES
 from app.gestures.records import MAX_GALLERIES, MAX_GESTURES
 from app.gestures.setfile import ZIP_MAX_BYTES
 from app.link import actions
+from app.memory import KINDS, PersonSettings
 from app.pipeline import STAGES
 from app.pipeline.burst import KEPT, MAX_FRAMES
 from app.pipeline.confusion import LIKELY, POSSIBLE
@@ -88,6 +89,13 @@ def test_every_cause_is_documented() -> None:
         assert f"`{cause}`" in TEXT, cause
 
 
+def test_every_kind_of_event_and_every_setting_of_a_person_is_documented() -> None:
+    for kind in KINDS:
+        assert f"| `{kind}` |" in TEXT, kind
+    for name in PersonSettings.model_fields:
+        assert f"`{name}`" in TEXT, name
+
+
 def test_every_word_for_what_is_wrong_with_an_image_is_documented() -> None:
     codes = set()
     for name in ("quality", "still", "burst", "confusion"):
@@ -125,6 +133,7 @@ def test_the_limits_are_the_settings() -> None:
     assert settings.gateway.max_observers == 100
     assert settings.gateway.max_frame_age_ms == 500
     assert settings.gateway.stop_confirm_ms == 300
+    assert (settings.memory.events, settings.memory.bytes) == (5000, 32 << 20)
     assert settings.gateway.picture_wait_s == 2.0
     assert settings.gateway.robot_rate_hz == 20
     assert settings.pipeline.decode.max_bytes == 256 * 1024

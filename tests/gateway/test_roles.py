@@ -289,11 +289,13 @@ def test_an_observer_sees_everything_and_moves_nothing(
         assert client.get("/").status_code == 200
         assert client.get("/metrics").status_code == 200
         assert client.get("/api/health").json()["robots"]
+        assert client.get("/api/timeline").json()["events"]
         for method, path in (
             ("DELETE", f"/api/gestures/{gesture}"),
             ("PATCH", f"/api/gestures/{gesture}"),
             ("POST", "/api/gestures"),
             ("POST", "/api/robots/puma/reset"),
+            ("PATCH", "/api/galleries/shared/settings"),
         ):
             refused = client.request(method, path, json={})
             assert refused.status_code == 403

@@ -77,6 +77,18 @@ export const api = Object.freeze({
     operatorCaptions: () => request("GET", "static/media/operator.json"),
     galleries: () => request("GET", "api/galleries"),
     createGallery: (name) => request("POST", "api/galleries", { json: { name } }),
+    /** What the owner of a gallery has chosen: {speed, fine, large, glass, language, source}. */
+    settings: (gallery) => request("GET", `api/galleries/${id(gallery)}/settings`),
+    changeSettings: (gallery, changes) =>
+        request("PATCH", `api/galleries/${id(gallery)}/settings`, { json: changes }),
+    /** A page of what happened, newest first: {events, before, lost}. */
+    timeline: ({ kinds = [], before = null } = {}) => {
+        const wanted = kinds.map((kind) => ["kind", kind]);
+        if (before !== null) wanted.push(["before", before]);
+        return request("GET", `api/timeline?${new URLSearchParams(wanted)}`);
+    },
+    /** Address of an event's "picture.jpg" or "template.png". */
+    eventUrl: (event, what) => `api/timeline/${id(event)}/${what}`,
     gestures: (gallery) =>
         request("GET", isNamed(gallery) ? `api/gestures?gallery=${id(gallery)}` : "api/gestures"),
     createGesture(name, action, images, gallery) {

@@ -15,6 +15,7 @@ export const INITIAL_STATE = Object.freeze({
     detailAt: -Infinity,
     gesture: null, // newest `gesture` message
     jog: null, // newest `jog` message: why nothing comes of what is held
+    timeline: null, // newest `timeline` message: something happened
     people: null, // newest `people` message
     gallery: "shared", // id of the gallery that this page is recognised against
     galleries: null, // those there are; null until known, and where there is only the shared one
@@ -48,6 +49,8 @@ export function changesFor(message, state, now) {
             return { gesture: message };
         case "jog":
             return { jog: message };
+        case "timeline":
+            return { timeline: message };
         case "people":
             return { people: message };
         case "robot": {

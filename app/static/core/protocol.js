@@ -29,6 +29,7 @@ export const SERVER_MESSAGES = Object.freeze([
     "people",
     "pong",
     "jog",
+    "timeline",
     "error",
 ]);
 

@@ -17,6 +17,15 @@ export function knownSpeed(text) {
     return text !== null && value >= SLOWEST && value <= 1 ? value : 1;
 }
 
+/**
+ * What is remembered of the speed, {speed, fine}, as far as it may come into force by itself: never
+ * faster than now while this page drives.
+ */
+export function safeSpeed(state, memory) {
+    const wanted = { speed: knownSpeed(memory.get("speed")), fine: memory.get("fine") === "yes" };
+    return isDriving(state) && speedOf(wanted) > speedOf(state) ? state : wanted;
+}
+
 export function speed(element, store) {
     const words = texts.speed;
     const slider = el("input", {

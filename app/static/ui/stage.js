@@ -209,7 +209,7 @@ class View3d {
 /**
  * Fills `element`. `feeds` maps camera names to feeds; `onFrame(window)` is called with the 3D
  * frame's window, so that keys work in there; `memory` keeps small choices. Returns `swap`, which
- * makes the other camera large.
+ * makes the other camera large, and `recall`, which makes large what `memory` says.
  */
 export function stage(element, store, { feeds, onFrame, memory }) {
     const enlarge = (name) => {
@@ -228,9 +228,13 @@ export function stage(element, store, { feeds, onFrame, memory }) {
     const view3d = new View3d(enlarge, onFrame, { drawing, hidden, onHide });
     const views = [...cameras, view3d];
     element.append(...views.map((view) => view.element));
-    const last = memory.get("large");
-    const known = views.some((view) => view.element.dataset.view === last);
-    if (known && !(last === "3d" && hidden)) element.dataset.large = last;
+    const recall = () => {
+        const last = memory.get("large");
+        const known = views.some((view) => view.element.dataset.view === last);
+        const unseen = last === "3d" && view3d.element.classList.contains("is-hidden");
+        if (known && !unseen) element.dataset.large = last;
+    };
+    recall();
 
     const update = () => {
         const awake = document.visibilityState !== "hidden";
@@ -278,5 +282,5 @@ export function stage(element, store, { feeds, onFrame, memory }) {
         lostAt = null;
     });
 
-    return { swap };
+    return { swap, recall };
 }

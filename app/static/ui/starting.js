@@ -41,7 +41,8 @@ export class Starting {
     #choosePicture() {
         const choices = sourceChoices(this.host, "start");
         const box = el("div", { class: "choices-row" }, ...choices);
-        this.sheets.show("start", texts.actions.start, box, { focus: choices[0] });
+        const last = choices.find(({ id }) => id === `start-${this.memory.get("source")}`);
+        this.sheets.show("start", texts.actions.start, box, { focus: last || choices[0] });
     }
 
     /** Start a picture, or turn it off. */
