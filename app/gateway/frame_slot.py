@@ -4,7 +4,7 @@ import asyncio
 import time
 from collections.abc import Callable
 
-from app.config import DecodeSettings, Settings
+from app.config import Settings
 from app.errors import FrameRefused, NotAllowed
 from app.gateway.drive import Situation
 from app.gateway.frame_age import FrameAge
@@ -14,7 +14,7 @@ from app.gateway.metrics import Metrics
 from app.gateway.numbers import newer, tick_ms
 from app.gateway.roles import FRAME, Role, may_send
 from app.link.header import HEADER_SIZE, FrameHeader
-from app.pipeline.decode import read_header
+from app.pipeline.decode import read_within
 
 Situate = Callable[[Enrolled, float, str | None], Situation]
 """With this gallery, now (s, monotonic), of a frame that is too old for this reason or is not."""
@@ -73,7 +73,7 @@ class FrameSlot:
             raise NotAllowed("an observer's frames are not looked at", seq=seq)
         jpeg = message[HEADER_SIZE:]
         try:
-            check_frame(jpeg, self._limits)
+            read_within(jpeg, self._limits)
         except FrameRefused as error:
             error.detail["seq"] = seq
             raise
@@ -111,27 +111,3 @@ class FrameSlot:
         self._filled.clear()
         job, self._job = self._job, None
         return job
-
-
-def check_frame(jpeg: bytes, limits: DecodeSettings) -> None:
-    """Do nothing if the header of a JPEG says that it may be decoded.
-
-    Raises:
-        FrameRefused: it is too large, or no JPEG that is read here.
-    """
-    if len(jpeg) > limits.max_bytes:
-        raise FrameRefused(
-            f"the frame has {len(jpeg)} bytes: at most {limits.max_bytes} are accepted",
-            code="frame_too_large",
-            bytes=len(jpeg),
-            max_bytes=limits.max_bytes,
-        )
-    header = read_header(jpeg)
-    if header.width > limits.max_width or header.height > limits.max_height:
-        raise FrameRefused(
-            f"the frame is {header.width}x{header.height}: "
-            f"at most {limits.max_width}x{limits.max_height} is accepted",
-            code="frame_too_large",
-            width=header.width,
-            height=header.height,
-        )

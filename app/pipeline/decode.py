@@ -150,6 +150,31 @@ def read_header(data: bytes) -> JpegHeader:
     return JpegHeader(*size, end=found.end())
 
 
+def read_within(jpeg: bytes, limits: DecodeSettings) -> JpegHeader:
+    """Read the header of a frame, if the frame may be decoded.
+
+    Raises:
+        FrameRefused: see :func:`read_header`; also ``frame_too_large`` (bytes or pixels).
+    """
+    if len(jpeg) > limits.max_bytes:
+        raise FrameRefused(
+            f"the frame has {len(jpeg)} bytes: at most {limits.max_bytes} are accepted",
+            code="frame_too_large",
+            bytes=len(jpeg),
+            max_bytes=limits.max_bytes,
+        )
+    header = read_header(jpeg)
+    if header.width > limits.max_width or header.height > limits.max_height:
+        raise FrameRefused(
+            f"the frame is {header.width}x{header.height}: "
+            f"at most {limits.max_width}x{limits.max_height} is accepted",
+            code="frame_too_large",
+            width=header.width,
+            height=header.height,
+        )
+    return header
+
+
 class Decode:
     """JPEG to 8-bit pixels at working size; refuses by header, before decoding.
 
@@ -165,27 +190,10 @@ class Decode:
         """Decode one frame.
 
         Raises:
-            FrameRefused: see :func:`read_header`; also ``frame_too_large`` (bytes or pixels) and
-                ``frame_too_small``.
+            FrameRefused: see :func:`read_within`; also ``frame_too_small``.
         """
-        limits = self._settings
-        if len(jpeg) > limits.max_bytes:
-            raise FrameRefused(
-                f"the frame has {len(jpeg)} bytes: at most {limits.max_bytes} are accepted",
-                code="frame_too_large",
-                bytes=len(jpeg),
-                max_bytes=limits.max_bytes,
-            )
-        header = read_header(jpeg)
+        header = read_within(jpeg, self._settings)
         width, height = header.width, header.height
-        if width > limits.max_width or height > limits.max_height:
-            raise FrameRefused(
-                f"the frame is {width}x{height}: "
-                f"at most {limits.max_width}x{limits.max_height} is accepted",
-                code="frame_too_large",
-                width=width,
-                height=height,
-            )
         if min(width, height) < MIN_SIDE:
             raise FrameRefused(
                 f"the frame is {width}x{height}: at least {MIN_SIDE}x{MIN_SIDE} is needed",

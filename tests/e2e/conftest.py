@@ -104,9 +104,10 @@ class Browsers:
         )
 
     def give_back(self, browser: Browser, *arguments: str) -> None:
-        for context in browser.contexts:
-            context.close()
-        self._idle[arguments].append(browser)
+        if browser.is_connected():
+            for context in browser.contexts:
+                context.close()
+            self._idle[arguments].append(browser)
 
     def close(self) -> None:
         for browser in itertools.chain.from_iterable(self._idle.values()):

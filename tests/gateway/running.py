@@ -37,7 +37,7 @@ from app.link.session import open_session
 
 TOKEN = "test-token-0123456789-abcdefghij"
 BEARER = {"Authorization": f"Bearer {TOKEN}"}
-WAIT_S = 10.0
+WAIT_S = 20.0
 
 
 def wait_for(condition: Callable[[], Any], what: str = "", timeout_s: float = WAIT_S) -> Any:
@@ -73,15 +73,16 @@ class Running:
         self.hub = hub
         self.host = f"127.0.0.1:{port}"
         self.url = f"http://{self.host}"
-        self.http = httpx.Client(base_url=self.url, headers=BEARER, timeout=20, trust_env=False)
+        self.http = httpx.Client(base_url=self.url, headers=BEARER, timeout=60, trust_env=False)
 
     def operator(self, **options: Any) -> "Operator":
         """A new operator session."""
         return Operator(self.socket("/ws/operator", **options))
 
     def socket(self, path: str, **options: Any) -> ClientConnection:
-        options = {"additional_headers": BEARER, "max_size": None, **options}
-        return connect(f"ws://{self.host}{path}", proxy=None, open_timeout=20, **options)
+        # The server asks whether we are there; we wait for it however busy the machine is.
+        options = {"additional_headers": BEARER, "max_size": None, "ping_interval": None, **options}
+        return connect(f"ws://{self.host}{path}", proxy=None, open_timeout=60, **options)
 
 
 class Operator:

@@ -169,20 +169,28 @@ def test_held_keys_command_the_robot_and_frames_do_not_meanwhile(
 ) -> None:
     up = {"type": "jog_cartesian", "frame": "base", "linear": [0.0, 0.0, 0.1]}
     with server.operator() as operator:
-        operator.send("jog", hold=1, action=up, tick=operator.tick)
+
+        def press(hold: int, action: dict | None, **more: float) -> None:
+            """One message, by a page that has seen the newest tick."""
+            operator.next("robot")
+            operator.send("jog", hold=hold, action=action, tick=operator.tick, **more)
+
+        press(1, up)
         refused = operator.next("jog", hold=1)
         assert refused["reason"] == "nobody has control: take control first"
         take_and_arm(operator)
-        operator.send("jog", hold=2, action=up, scale=0.5, tick=operator.tick)
         command = wait_for(
-            lambda: next((c for c in node.commands if c.action is not None), None), "no command"
+            lambda: (
+                press(2, up, scale=0.5)
+                or next((c for c in node.commands if c.action is not None), None)
+            ),
+            "a command",
         )
         assert command.action.model_dump(exclude={"duration"})["linear"] == (0.0, 0.0, 0.1)
         assert (command.scale, command.frame) == (0.5, None)
         before = len(node.commands)
         operator.show(hand("open"))
-        operator.send("jog", hold=2, action=None, tick=operator.tick)
-        wait_for(lambda: len(node.commands) > before, "nothing held is no command")
+        wait_for(lambda: press(2, None) or len(node.commands) > before, "a command for nothing")
         assert all(c.frame is None for c in node.commands[before:])
         operator.send("jog", hold=3, action=up, tick=max(1, operator.tick - 5000))
         assert "too old to move the robot" in operator.next("jog", hold=3)["reason"]
