@@ -67,6 +67,7 @@ ROUTES: dict[str, Access] = {
     "PATCH /api/galleries/{id}": "operator",
     "DELETE /api/galleries/{id}": "operator",
     "POST /api/robots/{id}/dry-run": "operator",
+    "DELETE /api/robots/{id}/dry-run/{view}": "operator",
 }
 
 FRAME = "frame"

@@ -36,7 +36,13 @@ from app.gateway.tokens import TokenStore, cookie_of
 from tests.gateway.conftest import draw
 from tests.gateway.running import BEARER, TOKEN, Running, StandIn, wait_for
 
-SAMPLES = {"{id}": "a1", "{name}": "wrist", "{version}": "1", "{path:path}": "some/file.js"}
+SAMPLES = {
+    "{id}": "a1",
+    "{name}": "wrist",
+    "{version}": "1",
+    "{view}": "0123456789abcdef",
+    "{path:path}": "some/file.js",
+}
 DOCS = (Path(__file__).parents[2] / "docs" / "protocol.md").read_text()
 
 
