@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from app.gateway.viser_rehearsal import VIEW_ID
 from app.memory import PersonSettings
 
 _GALLERY = {"type": "string", "default": "shared", "description": "id of a gallery"}
@@ -138,6 +139,16 @@ DRY_RUN_BODY: dict[str, Any] = {
                         "type": "string",
                         "default": "current",
                         "description": "'current', 'home' or the name of a pose",
+                    },
+                    "view": {
+                        "type": "string",
+                        "pattern": f"^{VIEW_ID.pattern}$",
+                        "description": "id of the 3D view in which to show the path",
+                    },
+                    "still": {
+                        "type": "boolean",
+                        "default": False,
+                        "description": "there, the robot stands at the end of the path",
                     },
                 },
                 "additionalProperties": False,

@@ -1,4 +1,4 @@
-"""REST: would a program break a limit, and where?"""
+"""REST: would a program break a limit, and where? And the path in the 3D view of who asks."""
 
 import asyncio
 from typing import Any
@@ -11,6 +11,7 @@ from app.gateway.errors import BAD_BODY
 from app.gateway.jobs import Busy
 from app.gateway.json_bodies import parse_action, read_object
 from app.gateway.rest_robots import robot_of
+from app.gateway.viser_rehearsal import VIEW_ID
 from app.link.messages import DryRunRequest
 
 router = APIRouter(prefix="/api/robots", tags=["robots"])
@@ -32,14 +33,19 @@ START_MAX = 40
     },
 )
 async def dry_run(request: Request, id: str) -> dict[str, Any]:
-    """Do an action with a simulated arm: ``{"action": {...}, "from": "current"}``."""
+    """Do an action with a simulated robot: ``{"action": {...}, "from": "current"}``."""
     hub, robot = robot_of(request, id)
-    body = await read_object(request, ("action", "from"))
+    body = await read_object(request, ("action", "from", "view", "still"))
     if "action" not in body:
         raise Invalid("the field 'action' is missing", field="action")
     start = body.get("from", "current")
     if not isinstance(start, str) or not 0 < len(start) <= START_MAX:
         raise Invalid("from is 'current', 'home' or the name of a pose", field="from")
+    view, still = body.get("view"), body.get("still", False)
+    if view is not None:
+        check_view(view)
+    if not isinstance(still, bool):
+        raise Invalid("still is true or false", field="still")
     question = DryRunRequest(action=parse_action(body["action"]), start=start)
     if hub.checking.locked():
         raise Busy("another program is being checked; try again in a moment")
@@ -51,4 +57,30 @@ async def dry_run(request: Request, id: str) -> dict[str, Any]:
         raise RobotUnavailable(report.reason, robot=robot.id)
     if report.code != "ok":
         raise Invalid(report.reason, code=report.code)
+    if view is not None and hub.viser is not None:
+        hub.viser.rehearsals.show(view, report, still=still)
     return report.model_dump(mode="json", exclude={"code", "reason"})
+
+
+@router.delete(
+    "/{id}/dry-run/{view}",
+    status_code=204,
+    summary="Take a dry run's path out of a 3D view",
+    responses={404: {"description": "unknown id"}, 422: {"description": "not the id of a view"}},
+)
+async def hide_dry_run(request: Request, id: str, view: str) -> None:
+    """Nothing is shown in that view any more; it does no harm when nothing was."""
+    hub, _ = robot_of(request, id)
+    check_view(view)
+    if hub.viser is not None:
+        hub.viser.rehearsals.hide(view)
+
+
+def check_view(view: Any) -> None:
+    """Refuse what is no id of a 3D view.
+
+    Raises:
+        Invalid: it is not.
+    """
+    if not isinstance(view, str) or VIEW_ID.fullmatch(view) is None:
+        raise Invalid("view is 16 to 40 letters, digits, _ or -", field="view")

@@ -81,6 +81,7 @@ ROUTES: dict[str, Access] = {
     "DELETE /api/jobs/{id}": "operator",
     "PATCH /api/galleries/{id}/settings": "operator",
     "POST /api/robots/{id}/dry-run": "operator",
+    "DELETE /api/robots/{id}/dry-run/{view}": "operator",
 }
 
 FRAME = "frame"

@@ -18,6 +18,7 @@ from websockets.typing import Subprotocol
 
 from app.errors import WorldError
 from app.gateway.errors import error_response
+from app.gateway.viser_rehearsal import VIEW_ID
 
 if TYPE_CHECKING:
     from app.gateway.hub import Hub
@@ -81,16 +82,18 @@ async def viser_page(request: Request, path: str) -> Response:
 @router.websocket("/viser")
 @router.websocket("/viser/")
 async def viser_socket(socket: WebSocket) -> None:
-    """Carry messages both ways until either side closes."""
+    """Carry messages both ways until either side closes; ``?view=`` says whose view it is."""
     try:
         port = await _port(socket.app.state.hub)
     except ViewerUnavailable as error:
         await socket.send_denial_response(error_response(error))
         return
+    view = socket.query_params.get("view", "")
+    query = f"?view={view}" if VIEW_ID.fullmatch(view) else ""
     offered = [Subprotocol(name) for name in socket.scope.get("subprotocols", [])]
     try:
         upstream = await connect(
-            f"ws://127.0.0.1:{port}/",
+            f"ws://127.0.0.1:{port}/{query}",
             subprotocols=offered or None,
             compression=None,
             max_size=MAX_MESSAGE_BYTES,

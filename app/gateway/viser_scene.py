@@ -16,6 +16,9 @@ import numpy as np
 from app.errors import CannotStart
 from app.gateway.robot_port import RobotPort
 from app.gateway.viser_aids import SceneAids
+from app.gateway.viser_cameras import CameraViews
+from app.gateway.viser_rehearsal import FLOOR_M, Actor, Rehearsals
+from app.gateway.viser_trail import Trail
 from app.link.messages import Description, ObjectDescription, ObjectState, State
 
 if TYPE_CHECKING:
@@ -57,6 +60,10 @@ class ViserScene:
         self._described: Description | None = None
         self._urdf: ViserUrdf | None = None
         self._aids: SceneAids | None = None
+        self._cameras: CameraViews | None = None
+        self._trail: Trail | None = None
+        self.rehearsals = Rehearsals()
+        """Dry runs that are shown to who asked for them."""
         self._root: Any = None
         self.notice: str | None = None
         """What the view says in place of the robot."""
@@ -75,9 +82,24 @@ class ViserScene:
         return port
 
     @property
+    def server(self) -> "viser.ViserServer | None":
+        """The server of viser; None before it is started."""
+        return self._server
+
+    @property
     def aids(self) -> SceneAids | None:
         """What is shown beside the robot; None before the robot is."""
         return self._aids
+
+    @property
+    def cameras(self) -> CameraViews | None:
+        """The robot's cameras in the scene; None before the robot is."""
+        return self._cameras
+
+    @property
+    def trail(self) -> Trail | None:
+        """The tool's way of the last seconds; None before the robot is."""
+        return self._trail
 
     @property
     def shown_tick(self) -> int | None:
@@ -93,6 +115,8 @@ class ViserScene:
         """End the thread and the server."""
         self._ending.set()
         self._thread.join(timeout=1.0)
+        if self._cameras is not None:
+            self._cameras.rest()
         if self._server is not None:
             self._server.stop()
 
@@ -137,19 +161,34 @@ class ViserScene:
             log.debug("3D scene built in %.1f s", time.monotonic() - started)
         if state is None or self._described is None or state.tick == self._shown:
             return
+        watched = bool(self._server.get_clients())
+        if self._cameras is not None and not watched:
+            self._cameras.rest()
         # The first state is shown even when nobody looks: whoever comes next starts from there.
-        if self._shown is not None and not self._server.get_clients():
+        if self._shown is not None and not watched:
             return
         with self._server.atomic():
             self._update(state)
+            if self._cameras is not None and watched:
+                self._cameras.update(time.monotonic())
         self._shown = state.tick
+        if self._urdf is not None:
+            pose = self._pose_joints
+            actor = Actor(
+                self._urdf, lambda joints: pose(state.model_copy(update={"joints": joints}))
+            )
+            self.rehearsals.update(self._server, actor)
 
     def _build(self, server: "viser.ViserServer", description: Description) -> None:
+        self.rehearsals.forget_clients()
+        parts: list[SceneAids | CameraViews | Trail | None]
+        parts = [self._aids, self._cameras, self._trail]
+        for part in parts:
+            if part is not None:
+                part.remove()
+        self._aids = self._cameras = self._trail = None
         for handle in self._handles:
             handle.remove()
-        if self._aids is not None:
-            self._aids.remove()
-            self._aids = None
         if self._urdf is not None:
             self._urdf.remove()
             self._urdf = None
@@ -211,6 +250,8 @@ class ViserScene:
         self._pose_joints = posed(assets.model, urdf.get_actuated_joint_names())
         self._urdf = urdf
         self._aids = SceneAids(server, urdf, assets.model.workspace)
+        self._cameras = CameraViews(server, urdf, assets.model, self._robot.watch_camera)
+        self._trail = Trail(server, "/trail")
 
     def _add(self, server: "viser.ViserServer", thing: ObjectDescription) -> Any:
         red, green, blue, alpha = thing.colour
@@ -233,10 +274,14 @@ class ViserScene:
             )
             self._urdf.update_cfg(actual)
             self._aids.update(actual, commanded, state.clearance)
+            place = state.tool_position
             if state.base is not None:
                 x, y, heading = state.base
+                place = (x, y, FLOOR_M)
                 self._root.position = (x, y, 0.0)
                 self._root.wxyz = (np.cos(heading / 2), 0.0, 0.0, np.sin(heading / 2))
+            if self._trail is not None:
+                self._trail.update(state.tick / 1000, place)
         for thing in state.objects:
             self._place(thing)
 

@@ -278,12 +278,16 @@ class DryRunProblem(Message):
 
 
 class DryRunPath(Message):
-    """Where the arm would go, thinned: three lists of one length."""
+    """Where the robot would go, thinned: lists of one length."""
 
     times: tuple[float, ...] = Field(default=(), description="s")
     joints: tuple[tuple[float, ...], ...] = Field(default=(), description="rad")
     tool: tuple[tuple[float, float, float], ...] = Field(
         default=(), description="m, base frame; the tool centre point"
+    )
+    base: tuple[tuple[float, float, float], ...] = Field(
+        default=(),
+        description="of a mobile base: m, m, rad about Z, in the room; empty of an arm",
     )
 
 

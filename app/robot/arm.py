@@ -50,6 +50,15 @@ class Reading(NamedTuple):
     """Of a base that drives: m, m, rad about Z, in the room"""
 
 
+class Met(NamedTuple):
+    """A robot that drives is where a thing is."""
+
+    thing: str
+    """Its name"""
+    fixed: bool
+    """It cannot be pushed aside"""
+
+
 NearKind = Literal["scene", "hand", "held", "itself"]
 """``scene``: a link of the arm and a thing. ``hand``: a finger, or what carries the fingers, and a
 thing that does not move. ``held``: what is held and another thing. ``itself``: the arm and its own

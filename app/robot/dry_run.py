@@ -27,6 +27,7 @@ from app.robot.rehearsal import STEP_S, Rehearsal
 
 if TYPE_CHECKING:
     from app.robot.sim.kinematic_arm import KinematicArm
+    from app.robot.sim.rehearsed_base import RehearsedBase
 
 _log = logging.getLogger(__name__)
 
@@ -56,6 +57,7 @@ class DryRunProcess:
     ) -> None:
         self._robot, self._profile, self._settings, self._alive = robot, profile, settings, alive
         self._arm: KinematicArm | None = None
+        self._base: RehearsedBase | None = None
         self._state = NewestState()
         self._lock = threading.Lock()
         self._query: zenoh.Query | None = None
@@ -107,8 +109,7 @@ class DryRunProcess:
         if state is None:
             return DryRunReport(code="robot_unavailable", reason="the robot has not spoken yet")
         if state.base is not None:
-            reason = "a robot that drives has no dry run: nothing tells what is in its way"
-            return DryRunReport(code="no_dry_run", reason=reason)
+            return self._drive(request, state.base, state)
         arm = self._open_arm()
         poses = arm.description.poses
         if request.start == "current":
@@ -123,6 +124,25 @@ class DryRunProcess:
             return DryRunReport(code="unknown_pose", reason=reason)
         arm.place(joints, state.gripper, state.objects)
         return Rehearsal(arm, self._settings, self._alive).run(request.action)
+
+    def _drive(
+        self, request: DryRunRequest, base: tuple[float, float, float], state: State
+    ) -> DryRunReport:
+        if request.start != "current":
+            reason = "a robot that drives begins where it is: from is 'current'"
+            return DryRunReport(code="unknown_pose", reason=reason)
+        # Imported here, as below.
+        from app.robot.models import model_assets
+        from app.robot.sim.rehearsed_base import RehearsedBase
+        from app.robot.sim.world import STEPS_PER_SECOND
+
+        if self._base is None:
+            self._base = RehearsedBase(model_assets(self._profile), self._robot)
+        self._base.place(np.array(state.joints), base, state.objects)
+        rehearsal = Rehearsal(
+            self._base, self._settings, self._alive, meets=self._base.meets, dt=1 / STEPS_PER_SECOND
+        )
+        return rehearsal.run(request.action)
 
     def _open_arm(self) -> "KinematicArm":
         if self._arm is None:

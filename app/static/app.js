@@ -322,8 +322,11 @@ async function teach(gesture = null) {
             remove: api.deleteGesture,
             versions: api.versions,
             restore: api.restoreVersion,
-            check: (action, from) => api.dryRun(robotId(), action, from),
+            check: (...question) => api.dryRun(robotId(), ...question),
+            // Where that does not arrive, the 3D view has lost its connection, too.
+            forgetPath: (view) => api.hideDryRun(robotId(), view).catch(() => {}),
         },
+        view3d: views.view3d,
         async done(text, changes) {
             sheets.close();
             galleries.loadGestures();

@@ -1,5 +1,7 @@
 """A program is written, checked, saved and taken back on the page, with a real robot behind it."""
 
+import re
+
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
@@ -55,9 +57,18 @@ def test_a_program_is_checked_saved_and_taken_back(server: Server, open_page: Op
     expect(second).to_have_class("has-problem")
     expect(first).not_to_have_class("has-problem")
 
+    # The way is seen in the 3D view, which is hidden where WebGL is slow.
+    root = page.locator("html")
+    page.click("#check-3d")
+    expect(root).to_have_class(re.compile(r"\bhas-path\b"))
+    expect(page.locator("#view-3d iframe")).to_be_visible(timeout=SLOW)
+    expect(result).to_contain_text("The 3D view shows the way")
+
     # Mended: what was found is forgotten, and checked anew.
     second.locator("[name=offset-x]").fill("-5")
     expect(result).to_be_empty()
+    expect(root).not_to_have_class(re.compile(r"\bhas-path\b"))
+    expect(page.locator("#view-3d iframe")).to_have_count(0)
     expect(second).not_to_have_class("has-problem")
     page.locator("#sheet-teach select[name=from]").select_option("left")
     check(page)

@@ -116,6 +116,9 @@ def checker(server: Running, node: StandIn) -> Iterator[Checker]:
     made.close()
 
 
+VIEW = "0123456789abcdef"
+
+
 def check(server: Running, **body: Any) -> Any:
     return server.http.post("/api/robots/puma/dry-run", json=body)
 
@@ -130,7 +133,12 @@ def test_a_dry_run_says_what_the_robot_says(server: Running, checker: Checker) -
         "problems": [
             {"step": 2, "time_s": 1.0, "kind": "joint_limit", "message": "joint 5 is far"}
         ],
-        "path": {"times": [0.0], "joints": [[0.0] * 6], "tool": [[0.5, 0.0, 0.7]]},
+        "path": {
+            "times": [0.0],
+            "joints": [[0.0] * 6],
+            "tool": [[0.5, 0.0, 0.7]],
+            "base": [],
+        },
     }
     (asked,) = checker.asked
     assert asked.start == "home"
@@ -177,6 +185,10 @@ def test_why_nothing_was_checked_is_an_error(
         ({"action": HOME, "from": 3}, "invalid"),
         ({"action": HOME, "from": "x" * 41}, "invalid"),
         ({"action": HOME, "start": "home"}, "invalid"),
+        ({"action": HOME, "view": "short"}, "invalid"),
+        ({"action": HOME, "view": "no/slashes/in/there/please"}, "invalid"),
+        ({"action": HOME, "view": 5}, "invalid"),
+        ({"action": HOME, "view": VIEW, "still": "yes"}, "invalid"),
     ],
 )
 def test_bad_questions_are_refused(lasting: Running, body: dict[str, Any], code: str) -> None:
@@ -187,3 +199,15 @@ def test_without_anybody_to_answer_it_is_503(server: Running) -> None:
     wait_for(lambda: server.hub.robot.online, "the robot")
     error(check(server, action=HOME), 503, "robot_unavailable")
     error(server.http.post("/api/robots/other/dry-run", json={"action": HOME}), 404, "not_found")
+
+
+def test_without_a_3d_view_the_answer_is_the_same_and_nothing_is_kept(
+    server: Running, checker: Checker
+) -> None:
+    wait_for(lambda: check(server, action=HOME).status_code == 200, "an answer")
+    plain = check(server, action=HOME).json()
+    assert check(server, action=HOME, view=VIEW, still=True).json() == plain
+    path = "/api/robots/puma/dry-run/"
+    assert server.http.delete(path + VIEW).status_code == 204
+    error(server.http.delete(path + "short"), 422, "invalid")
+    error(server.http.delete(f"/api/robots/other/dry-run/{VIEW}"), 404, "not_found")

@@ -41,6 +41,7 @@ SAMPLES = {
     "{name}": "wrist",
     "{version}": "1",
     "{sample}": "b2",
+    "{view}": "0123456789abcdef",
     "{path:path}": "some/file.js",
 }
 DOCS = (Path(__file__).parents[2] / "docs" / "protocol.md").read_text()

@@ -5,14 +5,26 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import httpx
+import msgspec
 import numpy as np
 import pytest
 import viser
 from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection
 
 from app.gateway.viser_aids import box_edges
+from app.gateway.viser_rehearsal import view_of
 from app.gateway.viser_scene import ViserScene
-from tests.gateway.running import NEAR, Running, StandIn, running, settings_for, wait_for
+from app.link.messages import DryRunPath, DryRunProblem, DryRunReport
+from tests.gateway.running import (
+    NEAR,
+    Running,
+    StandIn,
+    StandInCamera,
+    running,
+    settings_for,
+    wait_for,
+)
 
 PROTOCOL = f"viser-v{viser.__version__}"
 
@@ -147,3 +159,73 @@ def test_without_the_robots_profile_the_view_says_so_and_goes_on(
         assert scene.notice is not None
         assert scene.notice.startswith("The profile of Stand-in is not on this machine")
         assert server.http.get("/viser/").status_code == 200
+
+
+MINE, OTHERS = "my-view-0123456789", "your-view-0123456789"
+CAMERA = {
+    "type": "ViewerCameraMessage",
+    "wxyz": (1.0, 0.0, 0.0, 0.0),
+    "position": (2.0, -1.6, 1.5),
+    "fov": 0.8,
+    "near": 0.01,
+    "far": 100.0,
+    "image_height": 480,
+    "image_width": 640,
+    "look_at": (0.2, 0.0, 0.6),
+    "up_direction": (0.0, 0.0, 1.0),
+}
+"""Who has told viser where their camera is counts as connected."""
+
+
+def look(server: Running, view: str) -> ClientConnection:
+    socket = server.socket(f"/viser?view={view}", subprotocols=[PROTOCOL])
+    socket.send(msgspec.msgpack.encode(CAMERA))
+    return socket
+
+
+def test_a_dry_run_is_shown_to_who_asked_and_to_nobody_else(
+    with_viser: Running, node: StandIn
+) -> None:
+    scene = with_viser.hub.viser
+    assert scene is not None
+    wait_for(lambda: scene.shown_tick, "the scene to be built", 60)
+    rehearsals = scene.rehearsals
+    steps = [step / 10 for step in range(11)]
+    report = DryRunReport(
+        duration_s=1.0,
+        problems=(DryRunProblem(step=1, time_s=0.5, kind="joint_limit", message="too far"),),
+        path=DryRunPath(
+            times=tuple(steps),
+            joints=tuple((step,) * 6 for step in steps),
+            tool=tuple((0.5, step, 0.7) for step in steps),
+        ),
+    )
+    rehearsals.show(MINE, report, still=True)  # before anybody looks: it waits
+    with StandInCamera(node, "wrist") as camera:
+        mine, others = look(with_viser, MINE), look(with_viser, OTHERS)
+        wait_for(lambda: rehearsals.shown == 1, "the dry run to be shown", 60)
+        assert scene.server is not None
+        clients = scene.server.get_clients()
+        assert len(clients) == 2
+        named = {client: view_of(scene.server, client) for client in clients}
+        assert sorted(named.values(), key=str) == [MINE, OTHERS]
+        for client, name in named.items():
+            nodes = clients[client].scene._handle_from_node_name
+            assert ("/dry_run/way" in nodes) == (name == MINE)
+            assert ("/dry_run/mark_0" in nodes) == (name == MINE)
+        # Somebody looks, so that the cameras are watched.
+        assert scene.cameras is not None
+        wait_for(lambda: camera.watched, "the camera to be watched")
+        rehearsals.hide(MINE)
+        wait_for(lambda: rehearsals.shown == 0, "the dry run to be gone")
+        assert all("/dry_run" not in c.scene._handle_from_node_name for c in clients.values())
+        # What is shown ends with the link, and comes back with it.
+        rehearsals.show(MINE, report, still=False)
+        wait_for(lambda: rehearsals.shown == 1, "the next one")
+        mine.close()
+        wait_for(lambda: rehearsals.shown == 0, "the link to end")
+        mine = look(with_viser, MINE)
+        wait_for(lambda: rehearsals.shown == 1, "it to come back")
+        mine.close()
+        others.close()
+        wait_for(lambda: not scene.cameras.watching, "the cameras to rest")

@@ -20,6 +20,7 @@ from tests.robot.test_node import ROOT, Remote, wait_for
 
 pytestmark = pytest.mark.timeout(180)
 
+HOME = Pose(name="home")
 MINUTE = Sequence(
     steps=(
         Repeat(
@@ -36,15 +37,18 @@ MINUTE = Sequence(
 class Checked:
     """A node with its dry-run process."""
 
-    def __init__(self) -> None:
+    def __init__(self, profile: str = "puma560", action: Action = HOME) -> None:
         self.folder = Path(tempfile.mkdtemp(prefix="fh-"))
         self.endpoint = socket_endpoint(self.folder / "n.sock")
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "app.robot.node", "--endpoint", self.endpoint, "--no-cameras"],
+            [
+                sys.executable, "-m", "app.robot.node", "--endpoint", self.endpoint,
+                "--no-cameras", "--profile", profile,
+            ],
             cwd=ROOT,
-        )
+        )  # fmt: skip
         self.remote = Remote(self.endpoint)
-        wait_for(lambda: self.ask(Pose(name="home")) is not None, "the first answer", 60)
+        wait_for(lambda: self.ask(action) is not None, "the first answer", 60)
 
     def ask(self, action: Action, start: str = "current") -> DryRunReport | None:
         """Once nothing else is being checked, and a child that was just started knows where the arm
@@ -169,5 +173,23 @@ def test_it_comes_back_when_killed_and_ends_with_the_node() -> None:
         node.process.wait()
         child.wait(20)
         assert not child.is_running()
+    finally:
+        node.close()
+
+
+def test_a_base_is_asked_where_it_would_drive() -> None:
+    ahead = MoveLinear(offset=(1.0, 0.0, 0.0))
+    node = Checked("husky", ahead)
+    try:
+        report = node.ask(ahead)
+        assert report is not None
+        assert (report.code, report.ok) == ("ok", True)
+        assert report.path.base[0] == pytest.approx((0.0, 0.0, 0.0), abs=0.01)
+        assert report.path.base[-1] == pytest.approx((1.0, 0.0, 0.0), abs=0.01)
+        assert node.remote.state.base == pytest.approx((0.0, 0.0, 0.0), abs=0.01)
+        elsewhere = node.ask(ahead, "start")
+        assert elsewhere is not None
+        assert elsewhere.code == "unknown_pose"
+        assert elsewhere.reason == "a robot that drives begins where it is: from is 'current'"
     finally:
         node.close()

@@ -15,6 +15,7 @@ from app.link.actions import (
 )
 from app.link.messages import JointDescription
 from app.robot.arm import Reading, Vector
+from app.robot.motion.at_work import AtWork
 from app.robot.motion.go_to import GoTo
 from app.robot.motion.trajectory import JointTrajectory
 
@@ -68,7 +69,9 @@ class DriveJog:
         self._wanted = wanted * part  # both alike, so that the curve stays the one asked for
         self._left = action.duration
         self.limits: tuple[str, ...] = (
-            (f"the robot moves at {100 * part:.0f}% of the speed asked for",) if part < 1 else ()
+            (AtWork(f"the robot moves at {100 * part:.0f}% of the speed asked for", "speed"),)
+            if part < 1
+            else ()
         )
 
     def step(self, trajectory: JointTrajectory, reading: Reading) -> bool:

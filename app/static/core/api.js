@@ -102,12 +102,13 @@ export const api = Object.freeze({
     versions: (gesture) => request("GET", `api/gestures/${id(gesture)}/versions`),
     restoreVersion: (gesture, version) =>
         change("POST", `api/gestures/${id(gesture)}/versions/${id(version)}/restore`),
-    /** Would an action break a limit? Nothing moves. */
-    dryRun: (robot, action, from) =>
+    /** Would an action break a limit? Nothing moves. `show`: {view, still}, to see the way in 3D. */
+    dryRun: (robot, action, from, show) =>
         request("POST", `api/robots/${id(robot)}/dry-run`, {
-            json: { action, from },
+            json: { action, from, ...show },
             timeoutMs: 35000,
         }),
+    hideDryRun: (robot, view) => request("DELETE", `api/robots/${id(robot)}/dry-run/${id(view)}`),
     /** Judge pictures as enrolment would; nothing is stored. */
     checkGesture: (images, gallery) =>
         request("POST", "api/gestures/check", { body: inGallery(imageForm(images), gallery) }),

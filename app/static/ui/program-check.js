@@ -21,10 +21,20 @@ export function describeReport(report) {
     return { good: report.ok, title, lines };
 }
 
-/** A button that tries the form's action and says what came of it. `check(action, from)` asks. */
-export function programCheck({ form, description, check }) {
+/** Where a dry run can begin: a robot that drives, only where it is. */
+function startsOf(description) {
+    const here = ["current", words.current];
+    if (description && description.drives) return [here];
     const poses = Object.keys((description && description.poses) || {}).filter((name) => name !== "home");
-    const starts = [["current", words.current], ["home", words.home], ...poses.map((name) => [name, name])];
+    return [here, ["home", words.home], ...poses.map((name) => [name, name])];
+}
+
+/**
+ * A button that tries the form's action and says what came of it. `check(action, from, path)` asks;
+ * `path` is a PathView, to be closed by whoever made it.
+ */
+export function programCheck({ form, description, check, path }) {
+    const starts = startsOf(description);
     const from = select("from", starts, "current");
     const result = el("div", { class: "check-result", role: "status", id: "check-result" });
     const start = button(words.check, { id: "action-check", iconName: "check", onclick: run });
@@ -36,7 +46,8 @@ export function programCheck({ form, description, check }) {
         result.className = "check-result";
         result.replaceChildren(el("p", { class: "quiet", text: words.checking }));
         try {
-            show(await check(form.value(), from.value));
+            path.close();
+            show(await check(form.value(), from.value, path.wanted()));
         } catch (error) {
             if (typeof error.status !== "number") throw error; // a mistake of the page
             result.className = "check-result is-bad";
@@ -55,6 +66,7 @@ export function programCheck({ form, description, check }) {
         result.replaceChildren(
             el("p", { class: "check-title", text: title }),
             ...(items.length ? [el("ul", { class: "check-list" }, ...items)] : []),
+            ...path.told(report, Boolean(description && description.drives)),
         );
         form.mark(new Set(report.problems.filter(({ kind }) => kind !== "slowed").map(({ step }) => step)));
         result.scrollIntoView({ block: "nearest" });
@@ -63,6 +75,7 @@ export function programCheck({ form, description, check }) {
     // What was found holds for what was checked.
     form.element.addEventListener("input", () => {
         if (!result.childElementCount) return;
+        path.close();
         result.className = "check-result";
         result.replaceChildren();
         form.mark(new Set());

@@ -103,10 +103,24 @@ function drawing3d() {
     }
 }
 
+/** An id that nobody guesses: what a dry run shows in this page's 3D view, it shows nowhere else. */
+function newViewId() {
+    const bytes = crypto.getRandomValues(new Uint8Array(16));
+    return Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
+}
+
+/** Address of the 3D view's own connection, which says whose view it is. */
+function viewSocket(id) {
+    const url = new URL(`viser?view=${id}`, document.baseURI);
+    url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+    return encodeURIComponent(url.href);
+}
+
 /** The 3D view in its frame: loaded when first seen, and again when the server came back. */
 class View3d {
     constructor(enlarge, onFrame, { drawing, hidden, onHide }) {
         this.onFrame = onFrame;
+        this.id = newViewId();
         this.visible = false;
         this.drawing = drawing;
         this.frame = null;
@@ -146,7 +160,7 @@ class View3d {
         this.setHidden(hidden);
     }
 
-    setHidden(hidden) {
+    setHidden(hidden, { remember = true } = {}) {
         const before = this.hidden;
         this.hidden = hidden;
         this.element.classList.toggle("is-hidden", hidden);
@@ -155,7 +169,7 @@ class View3d {
         this.big.hidden = hidden;
         if (hidden) this.#unload();
         else this.load();
-        if (before !== undefined) this.onHide(hidden);
+        if (before !== undefined && remember) this.onHide(hidden);
     }
 
     /** Load the frame if it is wanted, seen, and can be drawn. */
@@ -168,7 +182,8 @@ class View3d {
         setText(this.note, texts.stage.loading3d);
         this.frame = el("iframe", {
             title: texts.stage.views["3d"],
-            src: "viser/?fixedDpr=1", // one point a pixel: software WebGL has no speed to spare
+            // One point a pixel: software WebGL has no speed to spare.
+            src: `viser/?fixedDpr=1&websocket=${viewSocket(this.id)}`,
             onload: () => this.#loaded(),
         });
         this.element.prepend(this.frame);
@@ -209,7 +224,8 @@ class View3d {
 /**
  * Fills `element`. `feeds` maps camera names to feeds; `onFrame(window)` is called with the 3D
  * frame's window, so that keys work in there; `memory` keeps small choices. Returns `swap`, which
- * makes the other camera large, and `recall`, which makes large what `memory` says.
+ * makes the other camera large, `recall`, which makes large what `memory` says, and `view3d`, which can be
+ * borrowed: it is then open and large until it is given back, and nothing of that is remembered.
  */
 export function stage(element, store, { feeds, onFrame, memory }) {
     const enlarge = (name) => {
@@ -282,5 +298,27 @@ export function stage(element, store, { feeds, onFrame, memory }) {
         lostAt = null;
     });
 
-    return { swap, recall };
+    let lent = null; // how it was before
+    const borrowed = {
+        id: view3d.id,
+        canDraw: drawing !== "none",
+        get isHidden() {
+            return view3d.hidden;
+        },
+        borrow() {
+            lent ??= { large: element.dataset.large, hidden: view3d.hidden };
+            element.dataset.large = "3d";
+            document.documentElement.classList.add("has-path");
+            view3d.visible = true;
+            view3d.setHidden(false, { remember: false });
+        },
+        giveBack() {
+            if (!lent) return;
+            element.dataset.large = lent.large;
+            document.documentElement.classList.remove("has-path");
+            if (lent.hidden) view3d.setHidden(true, { remember: false });
+            lent = null;
+        },
+    };
+    return { swap, recall, view3d: borrowed };
 }

@@ -4,6 +4,7 @@ import { texts } from "../texts/en.js";
 import { ActionForm } from "./action-form.js";
 import { Capture } from "./capture.js";
 import { button, el, setText } from "./dom.js";
+import { PathView } from "./path-view.js";
 import { formerVersions, programCheck } from "./program-check.js";
 import { describeError } from "./words.js";
 
@@ -12,10 +13,11 @@ const MOST_THUMBS = 12;
 
 /**
  * Contents for the sheet. `gesture` is null to enrol a new one. `act` does the work and throws
- * ApiError: {create, update, addSamples, remove, versions, restore, check}. `done(text, changes)` closes
- * the sheet; `changes` are the ids to take back by what was changed.
+ * ApiError: {create, update, addSamples, remove, versions, restore, check, forgetPath}. `view3d` shows
+ * the way of a dry run. `done(text, changes)` closes the sheet; `changes` are the ids to take back by
+ * what was changed.
  */
-export function teachContent({ gesture, store, video, grab, act, recognise, templateUrl, done }) {
+export function teachContent({ gesture, store, video, grab, act, recognise, templateUrl, view3d, done }) {
     const name = el("input", {
         id: "teach-name",
         name: "name",
@@ -38,6 +40,7 @@ export function teachContent({ gesture, store, video, grab, act, recognise, temp
         ownName: () => (gesture ? gesture.name : null),
         onTaken: () => setText(problem, ""),
     });
+    const path = new PathView(view3d, act.forgetPath);
     const problem = el("p", { class: "problem-line", role: "alert", id: "teach-problem" });
     const save = button(gesture ? words.saveChanges : words.save, {
         id: "teach-save",
@@ -118,7 +121,7 @@ export function teachContent({ gesture, store, video, grab, act, recognise, temp
             {},
             el("legend", { text: words.action }),
             form.element,
-            programCheck({ form, description: store.state.description, check: act.check }),
+            programCheck({ form, description: store.state.description, check: act.check, path }),
             gesture && gesture.version > 1 ? former() : null,
         ),
         el("div", { class: "sheet-foot" }, problem, row),
@@ -186,5 +189,9 @@ export function teachContent({ gesture, store, video, grab, act, recognise, temp
         return box;
     }
 
-    return { content, focus: name, close: () => capture.close() };
+    const close = () => {
+        capture.close();
+        path.close();
+    };
+    return { content, focus: name, close };
 }
