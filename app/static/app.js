@@ -16,7 +16,7 @@ import { SourceKeeper } from "./core/source-keeper.js";
 import { ServerClock } from "./core/server-clock.js";
 import { Stopper } from "./core/stopper.js";
 import { Store } from "./core/store.js";
-import { texts } from "./texts/en.js";
+import { texts } from "./texts/texts.js";
 import { setText } from "./ui/dom.js";
 import { dockButtons, steps, stopButton } from "./ui/dock.js";
 import { gestureList } from "./ui/gesture-list.js";

@@ -1,7 +1,5 @@
 // Every word of the page, in English. Another language is another file like this one.
 
-export const language = "en";
-
 /** A whole sentence from the server's plain words; "" stays "". */
 const sentence = (text) => {
     const clean = String(text || "").trim().replace(/[.\s]+$/, "");

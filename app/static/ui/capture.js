@@ -1,6 +1,6 @@
 // Taking still pictures of the hand, with a countdown, and saying at once whether one is usable.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { button, el, setLabel, setText } from "./dom.js";
 import { describeError } from "./words.js";
 

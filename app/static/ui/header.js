@@ -1,6 +1,6 @@
 // The bar at the top: state of the robot, who drives, connection.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { part, setIcon, setText } from "./dom.js";
 import { isDriving, modeOf } from "./page.js";
 

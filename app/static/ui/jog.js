@@ -1,6 +1,6 @@
 // Driving without a hand in the picture: buttons, keys and a gamepad, each for as long as it is held.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { el, setText } from "./dom.js";
 import { movesOf } from "./moves.js";
 import { describeAction } from "./words.js";

@@ -1,6 +1,6 @@
 // What can be held down: moves of this robot, each with its words, its key and its action.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 
 const words = texts.jog;
 const LINEAR = 0.1; // m/s, as the starter gestures

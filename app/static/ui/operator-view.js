@@ -1,6 +1,6 @@
 // The operator's own picture with the hand that was found, and where it comes from.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { bitmapFromBase64, button, el, icon, part, setText, want } from "./dom.js";
 
 const words = texts.operator;

@@ -1,6 +1,6 @@
 // Below an action's form: would it break a limit? And the actions that the gesture had before.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { field, select } from "./action-inputs.js";
 import { button, el, setText } from "./dom.js";
 import { describeAction, describeError, short } from "./words.js";

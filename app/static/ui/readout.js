@@ -1,6 +1,6 @@
 // The arm in figures: joints with their limits, gripper, tool, what is being done.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { button, el, part, setText, want } from "./dom.js";
 import { angle, degrees, describeAction, number, short } from "./words.js";
 

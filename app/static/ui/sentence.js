@@ -1,6 +1,6 @@
 // The one sentence that says what is happening and why.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { setText } from "./dom.js";
 import { isDriving, isObserver, modeOf } from "./page.js";
 import { describeAction } from "./words.js";

@@ -1,6 +1,6 @@
 // Sheets over the page: never modal, because the stop button below must stay in reach.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { button, el } from "./dom.js";
 
 /** At most one sheet is open. */

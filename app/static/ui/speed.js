@@ -1,6 +1,6 @@
 // How fast the arm moves: a slider, and a button for fine work.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { button, el, setText, want } from "./dom.js";
 import { isDriving } from "./page.js";
 import { percent } from "./words.js";

@@ -1,6 +1,6 @@
 // What the robot sees and how it stands: two cameras and the 3D view, one of them large.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { button, el, setText } from "./dom.js";
 
 const OLD_MS = 500; // from here on the age of a picture is shown

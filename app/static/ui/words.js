@@ -1,6 +1,6 @@
 // Numbers and actions as people say them.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 
 const words = texts.action;
 const AXES = ["x", "y", "z"];

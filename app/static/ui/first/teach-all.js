@@ -1,6 +1,6 @@
 // The step that teaches one gesture after another: shown as a drawing, taken when held still.
 
-import { texts } from "../../texts/en.js";
+import { texts } from "../../texts/texts.js";
 import { button, el, icon, isField, setText } from "../dom.js";
 import { isDriving } from "../page.js";
 import { describeError } from "../words.js";

@@ -1,6 +1,6 @@
 // The open glass box: every step of the recognition, drawn as it happens. Loaded when first opened.
 
-import { texts } from "../../texts/en.js";
+import { texts } from "../../texts/texts.js";
 import { bitmapFromBase64, el, setText } from "../dom.js";
 import { number, percent } from "../words.js";
 import { colours } from "./canvas.js";
