@@ -16,7 +16,7 @@ import { SourceKeeper } from "./core/source-keeper.js";
 import { ServerClock } from "./core/server-clock.js";
 import { Stopper } from "./core/stopper.js";
 import { Store } from "./core/store.js";
-import { texts } from "./texts/texts.js";
+import { texts, told, toldError } from "./texts/texts.js";
 import { setText } from "./ui/dom.js";
 import { dockButtons, steps, stopButton } from "./ui/dock.js";
 import { gestureList } from "./ui/gesture-list.js";
@@ -61,14 +61,14 @@ let lastError = null;
 // What is shown
 
 const root = document.documentElement;
-const sheets = new Sheets(byId("sheets"));
+const sheets = new Sheets(byId("sheets"), ["gone", "asking", "notices", "dock"].map(byId));
 const notices = new Notices(byId("notices"));
 askingNotice(byId("asking"), store);
 keepRootClasses(root, store);
 statePill(byId("state-pill"), store);
 driver(byId("driver"), store);
 connection(byId("connection"), store);
-goneOverlay(byId("gone"), store, (kind, why) => goneContent(kind, why, () => link.retryNow()));
+goneOverlay(byId("gone"), store, (kind, why) => goneContent(kind, why, () => link.retryNow()), byId("main"));
 steps(byId("steps"), store);
 dockButtons(byId("dock-buttons"), store);
 stopButton(byId("stop"), store);
@@ -249,12 +249,12 @@ function refused(message) {
         sender.answered(message.seq);
         return; // a single frame; the next one comes at once
     }
-    if (message.message) notices.show(message.message, { kind: "bad", name: message.code });
+    if (message.message) notices.show(toldError(message), { kind: "bad", name: message.code });
 }
 
 /** What is wrong with the gestures stays on the page for as long as it keeps the robot disarmed. */
 function tellProblem(problem) {
-    if (problem) notices.show(problem, { kind: "bad", name: "gestures", stay: true });
+    if (problem) notices.show(told(problem), { kind: "bad", name: "gestures", stay: true });
     else notices.clear("gestures");
 }
 

@@ -2,9 +2,13 @@
 // language is loaded.
 
 import { memory } from "../core/memory.js";
+import { translator } from "./phrases.js";
 
-/** What there is, each by its own name. */
-export const LANGUAGES = Object.freeze({ en: "English" });
+/** What there is, each by its own name, and with its own word for "language". */
+export const LANGUAGES = Object.freeze({
+    en: { name: "English", word: "Language" },
+    de: { name: "Deutsch", word: "Sprache" },
+});
 
 const KEPT_AS = "language";
 const known = (language) => Object.hasOwn(LANGUAGES, language || "");
@@ -16,7 +20,21 @@ export function pickLanguage(chosen, wanted) {
 }
 
 export const language = pickLanguage(memory.get(KEPT_AS), navigator.languages || []);
-export const { texts } = await import(`./${language}.js`);
+export const { texts, phrases } = await import(`./${language}.js`);
+
+const translate = translator(phrases, texts.numbers.decimal, texts.numbers.quote);
+
+/** The server's plain words in the language of the page; as they are where it has no others. */
+export function told(text) {
+    const plain = String(text || "");
+    return translate(plain) ?? plain;
+}
+
+/** The same of an error's message, or what is known of its code: {code, message}. "" for neither. */
+export function toldError({ code, message }) {
+    const plain = message ? translate(message) : null;
+    return plain ?? texts.errors.codes[code] ?? message ?? "";
+}
 
 /** Remember a language; the page speaks it once it is loaded again. */
 export function keepLanguage(wanted) {
