@@ -87,9 +87,9 @@ export const texts = Object.freeze({
 
     actions: {
         start: "Fahrt beginnen",
-        take: "Steuerung übernehmen",
+        take: "Steuern",
         takeOver: "Ablösen",
-        release: "Steuerung abgeben",
+        release: "Abgeben",
         arm: "Freigeben",
         disarm: "Sperren",
         reset: "Zurücksetzen",
@@ -380,12 +380,12 @@ export const texts = Object.freeze({
             right: "Rechts",
             up: "Hoch",
             down: "Runter",
-            "turn-left": "Nach links drehen",
-            "turn-right": "Nach rechts drehen",
-            "tip-forward": "Nach vorn kippen",
-            "tip-back": "Nach hinten kippen",
-            "roll-left": "Nach links rollen",
-            "roll-right": "Nach rechts rollen",
+            "turn-left": "Links drehen",
+            "turn-right": "Rechts drehen",
+            "tip-forward": "Vorkippen",
+            "tip-back": "Zurückkippen",
+            "roll-left": "Links rollen",
+            "roll-right": "Rechts rollen",
             open: "Öffnen",
             close: "Schließen",
             home: "Grundstellung",
@@ -555,7 +555,7 @@ export const texts = Object.freeze({
 
         drive: {
             list: {
-                control: "Steuerung übernehmen",
+                control: "Die Steuerung übernehmen",
                 arm: "Freigeben",
                 show: "Den Arm mit zwei Gesten bewegen",
                 stop: "Ihn stoppen",
@@ -564,7 +564,7 @@ export const texts = Object.freeze({
             tasks: {
                 wait: () => "Wartet auf den Roboter.",
                 ask: (name) => `${name} steuert gerade. Bitten Sie unten um die Steuerung.`,
-                control: () => "Drücken Sie unten „Steuerung übernehmen“.",
+                control: () => "Drücken Sie unten „Steuern“.",
                 arm: () => "Drücken Sie unten „Freigeben“. Senken Sie vorher die Hand.",
                 stop: () => "Stoppen Sie ihn jetzt: mit STOPP unten oder der Leertaste.",
                 reset: () => "Der Roboter ist gestoppt. Drücken Sie unten „Zurücksetzen“: Das bewegt nichts.",
@@ -631,7 +631,7 @@ export const texts = Object.freeze({
         turnBy: (axis, angle) => `um ${axis} um ${angle}° drehen`,
         wait: (seconds) => `${seconds} s warten`,
         repeat: (times, what) => `${times}-mal: ${what}`,
-        home: "in die Grundstellung",
+        home: "Grundstellung",
         stop: "Roboter stoppen",
         stand: "stillstehen",
         lasting: (what, seconds) => `${what}, ${seconds} s lang`,
@@ -814,7 +814,7 @@ export const texts = Object.freeze({
         title: "Hilfe",
         how: [
             "Fahrt beginnen: Wählen Sie Ihre Kamera, ohne Kamera die gezeichnete Hand, oder Tasten.",
-            "Steuerung übernehmen: Immer nur eine Person steuert.",
+            "Steuern: Immer nur eine Person hat die Steuerung.",
             "Freigeben: Ab dann bewegen Ihre Gesten den Roboter.",
             "Zeigen Sie eine Geste und halten Sie still. Der Roboter bewegt sich, solange Sie sie halten, und hält an, wenn Sie die Hand senken.",
         ],

@@ -101,6 +101,13 @@ export function readout(element, store) {
         putBack.disabled = !robot || !robot.online || robot.armed || robot.mode === "faulted";
     }
 
+    // What scrolls is in reach of the keyboard, also while it has no button that can be pressed.
+    const reach = new ResizeObserver(() => {
+        if (element.scrollHeight > element.clientHeight + 1) element.tabIndex = 0;
+        else element.removeAttribute("tabindex");
+    });
+    for (const each of [element, ...element.children]) reach.observe(each);
+
     store.watch(["robot", "description"], () => {
         if (timer) return;
         timer = setTimeout(() => {
