@@ -1,14 +1,7 @@
 // Every word of the page, in German: the twin of en.js.
 
 import { phrases } from "./de-server.js";
-
-/** A whole sentence from the server's plain words; "" stays "". */
-const sentence = (text) => {
-    const clean = String(text || "").trim().replace(/[.\s]+$/, "");
-    return clean ? `${clean[0].toUpperCase()}${clean.slice(1)}.` : "";
-};
-
-const plural = (count, one, many) => `${count} ${count === 1 ? one : many}`;
+import { asSentence, plural } from "./forms.js";
 
 export { phrases };
 
@@ -530,7 +523,7 @@ export const texts = Object.freeze({
             skipped: (name) => `„${name}“ ist übersprungen; es bleibt, wie es war.`,
             notSaved: (name, why) => `„${name}“ wurde nicht gespeichert: ${why} Zeigen Sie es noch einmal.`,
             like: (name) => `Das sieht aus wie „${name}“.`,
-            weak: (why, more) => [sentence(why), sentence(more), "Senken Sie die Hand, dann zeigen Sie es noch einmal."]
+            weak: (why, more) => [asSentence(why), asSentence(more), "Senken Sie die Hand, dann zeigen Sie es noch einmal."]
                 .filter(Boolean)
                 .join(" "),
             problems: {

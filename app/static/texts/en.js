@@ -1,12 +1,6 @@
 // Every word of the page, in English. Another language is another file like this one.
 
-/** A whole sentence from the server's plain words; "" stays "". */
-const sentence = (text) => {
-    const clean = String(text || "").trim().replace(/[.\s]+$/, "");
-    return clean ? `${clean[0].toUpperCase()}${clean.slice(1)}.` : "";
-};
-
-const plural = (count, one, many) => `${count} ${count === 1 ? one : many}`;
+import { asSentence, plural } from "./forms.js";
 
 /** The server speaks English: its words stay as they are. */
 export const phrases = null;
@@ -527,7 +521,7 @@ export const texts = Object.freeze({
             skipped: (name) => `“${name}” is skipped; it stays as it was.`,
             notSaved: (name, why) => `“${name}” was not saved: ${why} Show it again.`,
             like: (name) => `This looks like “${name}”.`,
-            weak: (why, more) => [sentence(why), sentence(more), "Lower your hand, then show it again."]
+            weak: (why, more) => [asSentence(why), asSentence(more), "Lower your hand, then show it again."]
                 .filter(Boolean)
                 .join(" "),
             problems: {

@@ -1,5 +1,6 @@
 // The one sentence that says what is happening and why.
 
+import { asSentence, bare } from "../texts/forms.js";
 import { texts } from "../texts/texts.js";
 import { setText } from "./dom.js";
 import { isDriving, isObserver, modeOf } from "./page.js";
@@ -7,12 +8,6 @@ import { describeAction, toldOf } from "./words.js";
 
 const words = texts.sentence;
 const STALE_FRAME_MS = 700;
-
-const bare = (text) => String(text || "").trim().replace(/[.\s]+$/, "");
-const asSentence = (text) => {
-    const clean = bare(text);
-    return clean ? `${clean[0].toUpperCase()}${clean.slice(1)}.` : "";
-};
 
 function seen(state) {
     const gesture = state.gesture && state.gesture.phase !== "end" ? state.gesture.gesture : null;
