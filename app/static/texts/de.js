@@ -79,13 +79,14 @@ export const texts = Object.freeze({
     steps: { source: "Eingabe", control: "Steuerung", armed: "Freigabe" },
 
     actions: {
-        start: "Fahrt beginnen",
+        // Where a narrow button may break them.
+        start: "Fahrt be\u00adginnen",
         take: "Steuern",
         takeOver: "Ablösen",
-        release: "Abgeben",
-        arm: "Freigeben",
+        release: "Ab\u00adgeben",
+        arm: "Frei\u00adgeben",
         disarm: "Sperren",
-        reset: "Zurücksetzen",
+        reset: "Zurück\u00adsetzen",
         teach: "Geste einlernen",
         help: "Hilfe",
         close: "Schließen",

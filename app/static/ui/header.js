@@ -58,6 +58,10 @@ const OVERLAY_AFTER_MS = 1200; // a short break is not worth a curtain
 export function goneOverlay(element, store, build, covered) {
     let timer = 0;
     let shown = "";
+    // Nobody is to be led by Tab to what cannot be seen. The landmark itself stays.
+    const reachable = (yes) => {
+        for (const each of covered.children) each.inert = !yes;
+    };
     store.watch(["connection"], ({ connection: link }) => {
         const open = link.state === "open";
         if (open) {
@@ -65,7 +69,7 @@ export function goneOverlay(element, store, build, covered) {
             timer = 0;
             shown = "";
             element.hidden = true;
-            covered.inert = false;
+            reachable(true);
             return;
         }
         // A new try is no news: what is said stays until something comes of it.
@@ -77,7 +81,7 @@ export function goneOverlay(element, store, build, covered) {
             shown = kind;
             element.replaceChildren(build(kind, told(link.reason)));
             element.hidden = false;
-            covered.inert = true; // nobody is to be led by Tab to what cannot be seen
+            reachable(false);
         };
         if (kind === "signedOut") show();
         else if (!timer) {
