@@ -21,7 +21,7 @@ import { ServerClock } from "./core/server-clock.js";
 import { SettingsKeeper } from "./core/settings.js";
 import { Stopper } from "./core/stopper.js";
 import { Store } from "./core/store.js";
-import { texts } from "./texts/en.js";
+import { texts, told, toldError } from "./texts/texts.js";
 import { Control } from "./ui/control.js";
 import { setText } from "./ui/dom.js";
 import { dockButtons, steps, stopButton } from "./ui/dock.js";
@@ -74,7 +74,7 @@ const counts = { hello: 0, frame: 0, gesture: 0, robot: 0, gallery: 0, pong: 0, 
 // What is shown
 
 const root = document.documentElement;
-const sheets = new Sheets(byId("sheets"));
+const sheets = new Sheets(byId("sheets"), ["gone", "asking", "notices", "dock"].map(byId));
 const notices = new Notices(byId("notices"));
 const control = new Control(link, store, sheets, notices);
 askingNotice(byId("asking"), store);
@@ -82,7 +82,7 @@ keepRootClasses(root, store);
 statePill(byId("state-pill"), store);
 driver(byId("driver"), store);
 connection(byId("connection"), store);
-goneOverlay(byId("gone"), store, (kind, why) => goneContent(kind, why, () => link.retryNow()));
+goneOverlay(byId("gone"), store, (kind, why) => goneContent(kind, why, () => link.retryNow()), byId("main"));
 steps(byId("steps"), store);
 dockButtons(byId("dock-buttons"), store);
 stopButton(byId("stop"), store);
@@ -254,12 +254,12 @@ function refused(message) {
         sender.answered(message.seq);
         return; // a single frame; the next one comes at once
     }
-    if (message.message) notices.show(message.message, { kind: "bad", name: message.code });
+    if (message.message) notices.show(toldError(message), { kind: "bad", name: message.code });
 }
 
 /** What is wrong with the gestures stays on the page for as long as it keeps the robot disarmed. */
 function tellProblem(problem) {
-    if (problem) notices.show(problem, { kind: "bad", name: "gestures", stay: true });
+    if (problem) notices.show(told(problem), { kind: "bad", name: "gestures", stay: true });
     else notices.clear("gestures");
 }
 

@@ -17,6 +17,12 @@ const ERROR_CODES = {
     AbortError: "busy",
 };
 
+/** Which way a phone's camera looks, as far as the browser tells. */
+function facingOf(device) {
+    const can = device.getCapabilities ? device.getCapabilities() : {};
+    return (can.facingMode && can.facingMode[0]) || null;
+}
+
 /**
  * A source has `kind`, `label`, `start(video)`, `stop()`, and tells `lost` (detail: {code}) when it
  * ends by itself. Synthetic operator and webcam are interchangeable.
@@ -38,14 +44,17 @@ export class WebcamSource extends EventTarget {
         return null;
     }
 
-    /** Cameras as [{id, label}]; labels are empty before the first permission. */
+    /**
+     * Cameras as [{id, label, facing}]; labels are empty before the first permission. `facing` is
+     * "user" or "environment" on a phone whose browser tells, and null elsewhere.
+     */
     static async list() {
         if (WebcamSource.obstacle() || !navigator.mediaDevices.enumerateDevices) return [];
         try {
             const devices = await navigator.mediaDevices.enumerateDevices();
             return devices
                 .filter((device) => device.kind === "videoinput")
-                .map((device) => ({ id: device.deviceId, label: device.label }));
+                .map((device) => ({ id: device.deviceId, label: device.label, facing: facingOf(device) }));
         } catch {
             return [];
         }
@@ -57,6 +66,7 @@ export class WebcamSource extends EventTarget {
         if (obstacle) throw new SourceError(obstacle);
         const wish = { width: { ideal: 640 }, height: { ideal: 480 }, frameRate: { ideal: 30 } };
         if (this.deviceId) wish.deviceId = { exact: this.deviceId };
+        else wish.facingMode = { ideal: "user" }; // of a phone's cameras the one that sees who drives
         try {
             this.#stream = await navigator.mediaDevices.getUserMedia({ video: wish, audio: false });
         } catch (error) {

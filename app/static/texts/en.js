@@ -1,14 +1,9 @@
 // Every word of the page, in English. Another language is another file like this one.
 
-export const language = "en";
+import { asSentence, plural } from "./forms.js";
 
-/** A whole sentence from the server's plain words; "" stays "". */
-const sentence = (text) => {
-    const clean = String(text || "").trim().replace(/[.\s]+$/, "");
-    return clean ? `${clean[0].toUpperCase()}${clean.slice(1)}.` : "";
-};
-
-const plural = (count, one, many) => `${count} ${count === 1 ? one : many}`;
+/** The server speaks English: its words stay as they are. */
+export const phrases = null;
 
 export const texts = Object.freeze({
     title: "Farhand",
@@ -24,6 +19,16 @@ export const texts = Object.freeze({
     stopFailed:
         "The stop was not confirmed. Press STOP again, or cover the camera: without frames the " +
         "robot stops by itself.",
+
+    numbers: {
+        decimal: ".",
+        percent: (number) => `${number}%`,
+        quote: (text) => `“${text}”`,
+    },
+
+    language: {
+        note: "The page loads anew. Who drives gives up control by that.",
+    },
 
     headings: {
         header: "State",
@@ -190,6 +195,8 @@ export const texts = Object.freeze({
         useKeysWords: "Keyboard, buttons or a gamepad. Gestures are not needed.",
         choose: "Camera",
         otherCamera: (number) => `Camera ${number}`,
+        front: "Front camera",
+        rear: "Rear camera",
         stop: "Turn off",
         demonstration: "Demonstration",
         asking: "Waiting for the camera…",
@@ -387,7 +394,7 @@ export const texts = Object.freeze({
             PageDown: "PgDn",
         },
         joint: (name, sign) => `${name} ${sign < 0 ? "−" : "+"}`,
-        picked: (joint) => `Keys + and − turn joint ${joint}; a digit picks another.`,
+        picked: (joint) => `Keys + and − turn ${joint}; a digit picks another.`,
         pose: (name) => name,
     },
 
@@ -516,7 +523,7 @@ export const texts = Object.freeze({
             skipped: (name) => `“${name}” is skipped; it stays as it was.`,
             notSaved: (name, why) => `“${name}” was not saved: ${why} Show it again.`,
             like: (name) => `This looks like “${name}”.`,
-            weak: (why, more) => [sentence(why), sentence(more), "Lower your hand, then show it again."]
+            weak: (why, more) => [asSentence(why), asSentence(more), "Lower your hand, then show it again."]
                 .filter(Boolean)
                 .join(" "),
             problems: {
@@ -659,12 +666,13 @@ export const texts = Object.freeze({
                 "z-": "against tool z",
             },
         },
+        toolAxis: (axis) => `tool ${axis}`,
         linear: (direction, speed) => `${direction} ${speed} cm/s`,
         angular: (axis, speed) => `turn about ${axis} ${speed}°/s`,
-        jogJoint: (joint, speed) => `turn joint ${joint} ${speed}°/s`,
-        turnJoint: (joint, angle) => `turn joint ${joint} by ${angle}°`,
-        slideJoint: (joint, speed) => `move joint ${joint} ${speed} cm/s`,
-        slideJointBy: (joint, way) => `move joint ${joint} by ${way} cm`,
+        jogJoint: (joint, speed) => `turn ${joint} ${speed}°/s`,
+        turnJoint: (joint, angle) => `turn ${joint} by ${angle}°`,
+        slideJoint: (joint, speed) => `move ${joint} ${speed} cm/s`,
+        slideJointBy: (joint, way) => `move ${joint} by ${way} cm`,
         pose: (name) => `go to “${name}”`,
         open: "open gripper",
         closed: "close gripper",
@@ -871,12 +879,41 @@ export const texts = Object.freeze({
 
     errors: {
         unreachable: "The server does not answer. Try again when the connection is back.",
-        not_signed_in: "You are signed out. Open the link that the server printed.",
-        duplicate: "That name is taken. Choose another one.",
-        too_large: "The pictures are too large for the server.",
         other: (status) => `The server said no (${status}).`,
-        server: (words) => `${words}`,
         reset: "The reset was not accepted.",
+        // By the server's codes; see docs/protocol.md.
+        codes: {
+            not_signed_in: "You are signed out. Open the link that the server printed.",
+            not_allowed: "You may not do that here.",
+            foreign_origin: "This page does not belong to this server. Open the server's link.",
+            gestures_lost: "The gesture database was lost; until it is back, nothing can be armed.",
+            not_found: "The server does not have that any more.",
+            duplicate: "That name is taken. Choose another one.",
+            changed_meanwhile: "Somebody else has changed that meanwhile. Look at it again.",
+            no_control: "You do not have control.",
+            control_kept: "Who drives goes on driving.",
+            nobody_asks: "Nobody asks for that any more.",
+            control_lost: "Control is lost.",
+            shared_gallery: "The shared gestures stay.",
+            refused: "The robot refused.",
+            latched: "The robot is stopped: reset it first.",
+            moving: "The arm has not come to rest yet.",
+            armed: "That can be done only while the robot is disarmed or stopped.",
+            too_large: "That is too large for the server.",
+            invalid: "A value is out of its bounds.",
+            bad_action: "That is no action that the robot knows.",
+            no_dry_run: "A robot that drives cannot be checked beforehand.",
+            unknown_pose: "The robot has no such pose.",
+            image_refused: "The picture has no usable hand in it.",
+            busy: "There is too much to do right now. Try again in a moment.",
+            internal: "Something went wrong inside the server; its log says what.",
+            robot_unavailable: "The robot does not answer.",
+            no_picture: "The camera gave no picture.",
+            viewer_unavailable: "The 3D view is off or does not answer.",
+            database_broken: "The gesture database cannot be read.",
+            database_busy: "Another program holds the gesture database.",
+            disk_full: "The server has no space left.",
+        },
     },
 
     notices: {

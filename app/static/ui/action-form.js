@@ -1,6 +1,6 @@
 // Choosing what a gesture does, without writing JSON.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { AXES, DIRECTIONS, field, kindOf, numberInput, select, straightOf } from "./action-inputs.js";
 import { el } from "./dom.js";
 import { StepList } from "./step-list.js";

@@ -1,6 +1,6 @@
 // Taking still pictures of the hand, with a countdown, and saying at once whether one is usable.
 
-import { texts } from "../texts/en.js";
+import { texts, told } from "../texts/texts.js";
 import { button, el, setLabel, setText } from "./dom.js";
 import { describeError } from "./words.js";
 
@@ -135,7 +135,7 @@ export class Capture {
             const answer = await this.recognise(blob);
             if (!answer.roi) {
                 item.classList.add("is-bad");
-                setText(verdict, answer.reason);
+                setText(verdict, told(answer.reason));
                 return;
             }
             const seen = answer.match && answer.match.gesture;

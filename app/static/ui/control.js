@@ -1,6 +1,6 @@
 // Who drives: taking control, asking for it, giving it back, and what one is told of that.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { isDriving } from "./page.js";
 import { takeOverContent } from "./people.js";
 

@@ -1,6 +1,6 @@
 // The controls that are always in reach: steps, take control, arm, reset, STOP.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { button, el, icon, part, setLabel, setText, want } from "./dom.js";
 import { isDriving, modeOf } from "./page.js";
 

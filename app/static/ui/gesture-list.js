@@ -1,6 +1,6 @@
 // The enrolled gestures, what each does, and how close the hand is to each right now.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { button, el, icon, part, setText, want } from "./dom.js";
 import { describeAction, number } from "./words.js";
 

@@ -1,6 +1,6 @@
 // The glass box in the operator's card: folded, one sentence; open, every step of the recognition.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { el, icon, setText, want } from "./dom.js";
 import { showsHand } from "./page.js";
 import { thoughtFor } from "./thought.js";

@@ -1,6 +1,6 @@
 // The bar at the top: state of the robot, who drives, connection.
 
-import { texts } from "../texts/en.js";
+import { texts, told } from "../texts/texts.js";
 import { part, setIcon, setText } from "./dom.js";
 import { isDriving, modeOf } from "./page.js";
 
@@ -54,10 +54,14 @@ export function connection(element, store) {
 const TRY_LATER = 1013; // the close code of a server that has no room, or gave up waiting
 const OVERLAY_AFTER_MS = 1200; // a short break is not worth a curtain
 
-/** Says plainly that the server is gone. Leaves the dock with the stop button free. */
-export function goneOverlay(element, store, build) {
+/** Says plainly that the server is gone. Leaves the dock with the stop button free, not what is `covered`. */
+export function goneOverlay(element, store, build, covered) {
     let timer = 0;
     let shown = "";
+    // Nobody is to be led by Tab to what cannot be seen. The landmark itself stays.
+    const reachable = (yes) => {
+        for (const each of covered.children) each.inert = !yes;
+    };
     store.watch(["connection"], ({ connection: link }) => {
         const open = link.state === "open";
         if (open) {
@@ -65,6 +69,7 @@ export function goneOverlay(element, store, build) {
             timer = 0;
             shown = "";
             element.hidden = true;
+            reachable(true);
             return;
         }
         // A new try is no news: what is said stays until something comes of it.
@@ -74,8 +79,9 @@ export function goneOverlay(element, store, build) {
         const show = () => {
             if (shown === kind) return;
             shown = kind;
-            element.replaceChildren(build(kind, link.reason));
+            element.replaceChildren(build(kind, told(link.reason)));
             element.hidden = false;
+            reachable(false);
         };
         if (kind === "signedOut") show();
         else if (!timer) {

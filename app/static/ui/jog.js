@@ -1,9 +1,9 @@
 // Driving without a hand in the picture: buttons, keys and a gamepad, each for as long as it is held.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { el, setText } from "./dom.js";
 import { movesOf } from "./moves.js";
-import { describeAction } from "./words.js";
+import { describeAction, jointName } from "./words.js";
 
 const words = texts.jog;
 const TURN_KEYS = { "+": 1, "=": 1, "-": -1, "_": -1 };
@@ -92,7 +92,7 @@ export function jogPad(element, store, { held, mayPress, stop }) {
 
     function tellJoint() {
         const known = [...moves.values()].find((move) => move.joint === joint);
-        setText(picked, known ? words.picked(joint) : "");
+        setText(picked, known ? words.picked(jointName(joint)) : "");
     }
 
     function moveOf(event) {

@@ -1,6 +1,6 @@
 // The bar that shows where the time of one frame goes, and how old the robot's picture is.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { el, setText } from "./dom.js";
 
 const words = texts.latency;

@@ -1,6 +1,7 @@
 // What can be held down: moves of this robot, each with its words, its key and its action.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
+import { jointName } from "./words.js";
 
 const words = texts.jog;
 const LINEAR = 0.1; // m/s, as the starter gestures
@@ -52,7 +53,7 @@ function joints(description) {
         const speed = Math.min(joint.unit === "m" ? SLIDE : JOINT, joint.velocity);
         return [-1, 1].map((sign) => ({
             id: `joint-${index + 1}${sign < 0 ? "-" : "+"}`,
-            label: words.joint(joint.name, sign),
+            label: words.joint(jointName(index + 1), sign),
             joint: index + 1,
             sign,
             action: { type: "jog_joint", joint: index + 1, velocity: sign * speed },

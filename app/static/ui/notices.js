@@ -1,6 +1,6 @@
 // Short messages that go away by themselves, or stay when they must be seen.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { button, el } from "./dom.js";
 
 const STAY_MS = 6000;

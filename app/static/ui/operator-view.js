@@ -1,6 +1,6 @@
 // The operator's own picture with the hand that was found, and where it comes from.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { bitmapFromBase64, button, el, icon, part, setText, want } from "./dom.js";
 
 const words = texts.operator;
@@ -117,6 +117,21 @@ export function sourceProblem(element, code) {
     ];
 }
 
+/**
+ * What to call cameras, [{label, facing}]: a phone's by the way they look, others as they are called.
+ * Those of one name are numbered from the second on.
+ */
+export function cameraNames(cameras) {
+    const facing = { user: words.front, environment: words.rear };
+    const seen = new Map();
+    return cameras.map((camera, index) => {
+        const name = facing[camera.facing] || camera.label || words.otherCamera(index + 1);
+        const count = (seen.get(name) || 0) + 1;
+        seen.set(name, count);
+        return count > 1 ? `${name} ${count}` : name;
+    });
+}
+
 /** Fills the operator's card; returns the <video> that sources play in. */
 export function operatorView(element, store) {
     const video = part(element, "video");
@@ -159,9 +174,8 @@ export function operatorView(element, store) {
     store.watch(["cameras", "source"], (state) => {
         const list = state.cameras;
         const usable = list.filter((camera) => camera.id);
-        const options = usable.map((camera, index) =>
-            el("option", { value: camera.id, text: camera.label || words.otherCamera(index + 1) }),
-        );
+        const names = cameraNames(usable);
+        const options = usable.map(({ id }, index) => el("option", { value: id, text: names[index] }));
         const key = usable.map((camera) => camera.id + camera.label).join();
         if (cameras.dataset.key !== key) {
             cameras.dataset.key = key;

@@ -1,6 +1,6 @@
 // The page as a whole: its words, icons, and the classes on the root element that hold its state.
 
-import { language, texts } from "../texts/en.js";
+import { language, texts } from "../texts/texts.js";
 import { icon, setText } from "./dom.js";
 
 const lookUp = (path) => path.split(".").reduce((level, key) => level && level[key], texts);

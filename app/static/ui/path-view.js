@@ -1,6 +1,6 @@
 // The way of a dry run in the 3D view, for as long as what was checked stands in the form.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { button, el } from "./dom.js";
 
 const words = texts.check;

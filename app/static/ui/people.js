@@ -1,6 +1,6 @@
 // Who asks to drive, and the choice between asking and taking over.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { button, el, setText, want } from "./dom.js";
 import { isDriving } from "./page.js";
 

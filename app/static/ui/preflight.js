@@ -1,6 +1,6 @@
 // The list of what was checked, each with what to do about it.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { el, setText } from "./dom.js";
 
 const words = texts.preflight;

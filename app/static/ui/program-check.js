@@ -1,17 +1,18 @@
 // Below an action's form: would it break a limit? And the actions that the gesture had before.
 
-import { texts } from "../texts/en.js";
+import { language, texts } from "../texts/texts.js";
 import { field, select } from "./action-inputs.js";
 import { button, el, setText } from "./dom.js";
-import { describeAction, describeError, short } from "./words.js";
+import { describeAction, describeError, short, toldOf } from "./words.js";
 
 const words = texts.check;
 
 /** What a dry run found, in plain words: {good, title, lines}. */
-export function describeReport(report) {
+export function describeReport(report, description = null) {
     const serious = report.problems.filter(({ kind }) => kind !== "slowed");
     const lines = report.problems.map(({ step, time_s: time, message, kind }) => {
-        const said = message.charAt(0).toUpperCase() + message.slice(1);
+        const plain = toldOf(message, description);
+        const said = plain.charAt(0).toUpperCase() + plain.slice(1);
         const where = step === null ? words.anywhere(said) : words.inStep(step, said);
         return { text: words.after(where, short(time)), serious: kind !== "slowed" };
     });
@@ -58,7 +59,7 @@ export function programCheck({ form, description, check, path }) {
     }
 
     function show(report) {
-        const { good, title, lines } = describeReport(report);
+        const { good, title, lines } = describeReport(report, description);
         result.className = `check-result ${good ? "is-good" : "is-bad"}`;
         const items = lines.map(({ text, serious }) =>
             el("li", { class: serious ? "is-serious" : null, text }),
@@ -106,7 +107,7 @@ export function formerVersions({ gesture, description, list, restore }) {
     }
 
     function row({ version, action, created }) {
-        const when = new Date(created).toLocaleString();
+        const when = new Date(created).toLocaleString(language);
         return el(
             "li",
             {},

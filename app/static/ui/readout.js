@@ -1,8 +1,8 @@
 // The arm in figures: joints with their limits, gripper, tool, what is being done.
 
-import { texts } from "../texts/en.js";
+import { texts, told } from "../texts/texts.js";
 import { button, el, part, setText, want } from "./dom.js";
-import { angle, degrees, describeAction, number, short } from "./words.js";
+import { angle, degrees, describeAction, jointName, number, short, toldOf } from "./words.js";
 
 const words = texts.readout;
 const NEAR_LIMIT = 0.04; // of the joint's range
@@ -16,7 +16,7 @@ function jointRow(index) {
     const item = el(
         "li",
         { data: { joint: String(index + 1) } },
-        el("span", { class: "joint-name", text: words.joint(index + 1) }),
+        el("span", { class: "joint-name", text: jointName(index + 1) }),
         low,
         bar,
         high,
@@ -66,7 +66,7 @@ export function readout(element, store) {
             const lower = limit ? limit.lower : -Math.PI;
             const upper = limit ? limit.upper : Math.PI;
             const share = (values[index] - lower) / (upper - lower);
-            needle.style.left = `${(Math.min(1, Math.max(0, share)) * 100).toFixed(1)}%`;
+            needle.style.insetInlineStart = `${(Math.min(1, Math.max(0, share)) * 100).toFixed(1)}%`;
             needle.parentElement.hidden = drives;
             setText(value, slides ? words.slideValue(number(values[index] * 100)) : angle(values[index]));
             setText(low, limit ? end(lower) : "");
@@ -92,14 +92,21 @@ export function readout(element, store) {
         const near = robot && robot.clearance;
         nearest.parentElement.hidden = !near;
         if (near) {
-            const thing = near.itself ? words.itself(near.thing) : near.thing;
-            setText(nearest, words.nearestValue(number(near.distance * 1000, 0), thing, near.link));
+            const thing = near.itself ? words.itself(told(near.thing)) : told(near.thing);
+            setText(nearest, words.nearestValue(number(near.distance * 1000, 0), thing, told(near.link)));
         }
         const limited = (robot && robot.limits) || [];
         active.parentElement.hidden = !limited.length;
-        setText(active, limited.join(", "));
+        setText(active, limited.map((limit) => toldOf(limit, description)).join(", "));
         putBack.disabled = !robot || !robot.online || robot.armed || robot.mode === "faulted";
     }
+
+    // What scrolls is in reach of the keyboard, also while it has no button that can be pressed.
+    const reach = new ResizeObserver(() => {
+        if (element.scrollHeight > element.clientHeight + 1) element.tabIndex = 0;
+        else element.removeAttribute("tabindex");
+    });
+    for (const each of [element, ...element.children]) reach.observe(each);
 
     store.watch(["robot", "description"], () => {
         if (timer) return;

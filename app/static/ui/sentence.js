@@ -1,18 +1,13 @@
 // The one sentence that says what is happening and why.
 
-import { texts } from "../texts/en.js";
+import { asSentence, bare } from "../texts/forms.js";
+import { texts } from "../texts/texts.js";
 import { setText } from "./dom.js";
 import { isDriving, isObserver, modeOf } from "./page.js";
-import { describeAction } from "./words.js";
+import { describeAction, toldOf } from "./words.js";
 
 const words = texts.sentence;
 const STALE_FRAME_MS = 700;
-
-const bare = (text) => String(text || "").trim().replace(/[.\s]+$/, "");
-const asSentence = (text) => {
-    const clean = bare(text);
-    return clean ? `${clean[0].toUpperCase()}${clean.slice(1)}.` : "";
-};
 
 function seen(state) {
     const gesture = state.gesture && state.gesture.phase !== "end" ? state.gesture.gesture : null;
@@ -22,7 +17,7 @@ function seen(state) {
 /** A gesture is held, and the arm stands. */
 function whileStanding(state, gesture) {
     const why = state.robot.reason || state.frame.reason;
-    if (why) return `${words.seen(gesture)} ${asSentence(why)}`;
+    if (why) return `${words.seen(gesture)} ${asSentence(toldOf(why, state.description))}`;
     // A jog does not end by itself: it is about to begin.
     const known = state.gestures.find(({ name }) => name === gesture);
     const over = known && !known.action.type.startsWith("jog_") && state.gesture.phase === "hold";
@@ -34,7 +29,7 @@ const byKeys = (state) => state.source.kind === "keys";
 /** What the arm does not do by keys, and why not. */
 function whileStandingByKeys(state) {
     const why = state.jog && state.jog.reason;
-    return why ? asSentence(why) : words.readyKeys;
+    return why ? asSentence(toldOf(why, state.description)) : words.readyKeys;
 }
 
 function whileDriving(state, now) {
@@ -42,18 +37,18 @@ function whileDriving(state, now) {
     if (state.source.state === "starting") return words.sourceStarting;
     if (state.source.state !== "running") return words.noSource;
     const gesture = seen(state);
+    const limits = (robot.limits || []).map((each) => toldOf(each, state.description)).join(", ");
     if (robot.mode === "moving" && robot.action) {
         const what = describeAction(robot.action, state.description);
-        const limits = robot.limits && robot.limits.length ? robot.limits.join(", ") : "";
         const tail = limits ? ` ${words.limits(limits)}` : "";
         return (gesture ? words.movingHold(gesture, what) : words.moving(what)) + tail;
     }
-    if (robot.limits && robot.limits.length) return words.limits(robot.limits.join(", "));
+    if (limits) return words.limits(limits);
     if (byKeys(state)) return whileStandingByKeys(state);
     if (!frame) return words.waitingPicture;
     if (now - state.frameAt > STALE_FRAME_MS) return words.noFrames;
     if (gesture) return whileStanding(state, gesture);
-    return frame.reason ? asSentence(frame.reason) : words.ready;
+    return frame.reason ? asSentence(toldOf(frame.reason, state.description)) : words.ready;
 }
 
 /** What is happening and why, in one or two short sentences. */
@@ -64,8 +59,9 @@ export function sentenceFor(state, now) {
     const { robot } = state;
     if (!robot) return words.noRobot;
     const mode = modeOf(state);
-    const why = bare(robot.reason);
-    if (mode === "faulted") return words.fault(bare(robot.fault) || words.faultUnknown);
+    const plain = bare(robot.reason); // as the robot says it
+    const why = toldOf(plain, state.description);
+    if (mode === "faulted") return words.fault(toldOf(bare(robot.fault), state.description) || words.faultUnknown);
     if (mode === "unknown") return words.noRobot;
     if (mode === "stopped") {
         return `${words.stopped(why)} ${isObserver(state) ? words.stoppedWatch : words.stoppedNext}`;
@@ -90,11 +86,11 @@ export function sentenceFor(state, now) {
     }
     if (mode === "holding" && byKeys(state)) {
         // The robot's own words for how to go on are about gestures.
-        return `${words.holding(/gesture/.test(why) ? "" : why)} ${words.holdingKeys}`;
+        return `${words.holding(/gesture/.test(plain) ? "" : why)} ${words.holdingKeys}`;
     }
     if (mode === "holding") {
         // Some reasons say themselves how to go on.
-        const next = /gesture/.test(why) ? "" : ` ${words.holdingNext}`;
+        const next = /gesture/.test(plain) ? "" : ` ${words.holdingNext}`;
         return words.holding(why) + next;
     }
     return whileDriving(state, now);
@@ -120,7 +116,7 @@ export function sentence(element, spoken, store) {
         const text = sentenceFor(store.state, now);
         if (text !== element.textContent) shownAt = now;
         setText(element, text);
-        const gist = text.replace(/[\d.,]+ ?%/g, "").replace(/\s+/g, " ");
+        const gist = text.replace(/[\d.,]+\s?%/g, "").replace(/\s+/g, " ");
         if (now - spokenAt > SPEAK_EVERY_MS && spoken.dataset.gist !== gist) {
             spokenAt = now;
             spoken.dataset.gist = gist;

@@ -1,15 +1,23 @@
-// Sheets over the page: never modal, because the stop button below must stay in reach.
+// Sheets over the page: never modal, because the stop button below must stay in reach. Tab goes round
+// the sheet and what is beside it.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { button, el } from "./dom.js";
+import { languageChoice } from "./language.js";
+import { tabCircle } from "./tab-circle.js";
 
 /** At most one sheet is open. */
 export class Sheets {
     #host;
+    #places;
     #open = null;
 
-    constructor(host) {
+    /** `beside`: elements that stay in reach of Tab with those of `host`. */
+    constructor(host, beside = []) {
         this.#host = host;
+        const order = (one, other) =>
+            one.compareDocumentPosition(other) & Node.DOCUMENT_POSITION_FOLLOWING ? -1 : 1;
+        this.#places = [host, ...beside].sort(order);
     }
 
     get isOpen() {
@@ -45,7 +53,7 @@ export class Sheets {
         const before = document.activeElement;
         this.#host.append(sheet);
         sheet.show();
-        this.#open = { name, sheet, before, onclose };
+        this.#open = { name, sheet, before, onclose, freeTab: tabCircle(this.#places) };
         (focus || heading).focus();
         return sheet;
     }
@@ -53,8 +61,9 @@ export class Sheets {
     /** Close what is open; says whether there was something. */
     close() {
         if (!this.#open) return false;
-        const { sheet, before, onclose } = this.#open;
+        const { sheet, before, onclose, freeTab } = this.#open;
         this.#open = null;
+        freeTab();
         sheet.remove();
         if (onclose) onclose();
         if (before && before.isConnected && before !== document.body) before.focus();
@@ -66,6 +75,7 @@ export class Sheets {
 export function helpContent(first, check) {
     const { how, keysTitle, keys, keysNote, safetyTitle, safety } = texts.help;
     return [
+        languageChoice(),
         el("ol", { class: "how" }, ...how.map((text) => el("li", { text }))),
         el("h3", { text: keysTitle }),
         el(

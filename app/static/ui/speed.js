@@ -1,9 +1,9 @@
 // How fast the arm moves: a slider, and a button for fine work.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { button, el, setText, want } from "./dom.js";
 import { isDriving } from "./page.js";
-import { percent } from "./words.js";
+import { percent, short } from "./words.js";
 
 export const FINE = 0.2; // of the ordinary speed
 export const SLOWEST = 0.05;
@@ -49,7 +49,7 @@ export function speed(element, store) {
         element.hidden = !isDriving(state);
         const wanted = String(Math.round(speedOf(state) * 100));
         if (slider.value !== wanted) slider.value = wanted;
-        const shown = percent(speedOf(state)).replace(/\.0%$/, "%");
+        const shown = percent(speedOf(state), short);
         setText(value, shown);
         slider.setAttribute("aria-valuetext", shown);
         fine.setAttribute("aria-pressed", String(state.fine));

@@ -1,7 +1,8 @@
 // What the robot sees and how it stands: two cameras and the 3D view, one of them large.
 
-import { texts } from "../texts/en.js";
+import { texts, told } from "../texts/texts.js";
 import { button, el, setText } from "./dom.js";
+import { number } from "./words.js";
 
 const OLD_MS = 500; // from here on the age of a picture is shown
 const LONG_AWAY_MS = 1500; // a server that starts takes longer
@@ -65,7 +66,7 @@ class CameraView {
         const late = this.takenAt ? now - this.takenAt : 0;
         const old = this.open && late > OLD_MS;
         this.element.classList.toggle("is-old", old);
-        setText(this.age, old ? texts.stage.age((late / 1000).toFixed(1)) : "");
+        setText(this.age, old ? texts.stage.age(number(late / 1000)) : "");
         if (!this.takenAt && this.open) {
             const dead = this.feed.failures > 1;
             setText(this.empty, dead ? texts.stage.noCamera : texts.stage.noPicture);
@@ -261,7 +262,7 @@ export function stage(element, store, { feeds, onFrame, memory }) {
     store.watch(["description"], ({ description }) => {
         for (const { name, title } of (description && description.cameras) || []) {
             const camera = cameras.find((candidate) => candidate.name === name);
-            if (camera && title) camera.rename(title);
+            if (camera && title) camera.rename(told(title));
         }
     });
     const seen = new IntersectionObserver(

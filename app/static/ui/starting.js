@@ -1,6 +1,6 @@
 // From a page just opened to somebody who drives: choose a picture, or go through the first minutes.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { button, el, want } from "./dom.js";
 import { isOwn, isReturning, readProgress } from "./first/plan.js";
 import { sourceChoices } from "./operator-view.js";

@@ -1,6 +1,6 @@
 // A list of steps, each with a form of its own: what a sequence and a repeat hold.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { button, el } from "./dom.js";
 
 const words = texts.actionForm;

@@ -1,6 +1,6 @@
 // The sheet that enrols a gesture, and changes or deletes one.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { ActionForm } from "./action-form.js";
 import { Capture } from "./capture.js";
 import { button, el, setText } from "./dom.js";

@@ -1,6 +1,6 @@
 // What the recognition makes of the hand, in one sentence: what it says, and why.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { showsHand } from "./page.js";
 
 const words = texts.thought;

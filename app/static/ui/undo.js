@@ -1,6 +1,6 @@
 // What was changed can be taken back: by the notice that tells of it, or by Ctrl+Z.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { isField } from "./dom.js";
 import { describeError } from "./words.js";
 

@@ -1,6 +1,6 @@
 // Under the gestures' heading: whose they are, and the way into the first minutes.
 
-import { texts } from "../texts/en.js";
+import { texts } from "../texts/texts.js";
 import { button, setLabel, want } from "./dom.js";
 import { isReturning } from "./first/plan.js";
 import { nameOf } from "./words.js";

@@ -1,6 +1,6 @@
 // Numbers and actions as people say them.
 
-import { texts } from "../texts/en.js";
+import { told, toldError, texts } from "../texts/texts.js";
 
 const words = texts.action;
 const AXES = ["x", "y", "z"];
@@ -11,12 +11,13 @@ export function number(value, digits = 1) {
     if (!Number.isFinite(value)) return "–";
     const text = value.toFixed(digits);
     const zero = Number(text) === 0;
-    return (zero ? text.replace("-", "") : text).replace("-", "−");
+    const signed = (zero ? text.replace("-", "") : text).replace("-", "−");
+    return signed.replace(".", texts.numbers.decimal);
 }
 
 /** Like number(), but "10" and not "10.0". */
 export function short(value, digits = 1) {
-    return number(value, digits).replace(/\.0+$/, "");
+    return number(value, digits).replace(/[.,]0+$/, "");
 }
 
 export const degrees = (radians) => radians * DEGREES;
@@ -25,8 +26,19 @@ export const radians = (value) => value / DEGREES;
 /** "12.3°" */
 export const angle = (value) => `${number(degrees(value))}°`;
 
-/** "4.2%" */
-export const percent = (fraction) => `${number(fraction * 100)}%`;
+/** "4.2%"; with `form` short(), "4%" and not "4.0%". */
+export const percent = (fraction, form = number) => texts.numbers.percent(form(fraction * 100));
+
+/** What the page calls the joint of that number, from 1. */
+export const jointName = (number) => texts.readout.joint(number);
+
+/** The server's plain words about this robot, its joints called what the page calls them. */
+export function toldOf(text, description) {
+    const joints = (description && description.joints) || [];
+    const names = joints.map(({ name }, index) => [name, jointName(index + 1)]);
+    const plain = String(text || "").replace(/\bjoint (\d+)\b/g, (_, number) => jointName(number));
+    return told(names.reduce((said, [name, short]) => said.replaceAll(name, short), plain));
+}
 
 function cartesian(action) {
     const frame = action.frame === "tool" ? "tool" : "base";
@@ -38,7 +50,7 @@ function cartesian(action) {
     });
     (action.angular || []).forEach((speed, axis) => {
         if (!speed) return;
-        const name = frame === "tool" ? `tool ${AXES[axis]}` : AXES[axis];
+        const name = frame === "tool" ? words.toolAxis(AXES[axis]) : AXES[axis];
         parts.push(words.angular(name, short(degrees(speed))));
     });
     return parts.length ? parts.join(", ") : words.stand;
@@ -54,7 +66,7 @@ function way(action) {
     });
     (action.rotation || []).forEach((turn, axis) => {
         if (!turn) return;
-        const name = frame === "tool" ? `tool ${AXES[axis]}` : AXES[axis];
+        const name = frame === "tool" ? words.toolAxis(AXES[axis]) : AXES[axis];
         parts.push(words.turnBy(name, short(degrees(turn))));
     });
     return parts.length ? parts.join(", ") : words.stand;
@@ -81,14 +93,14 @@ function simple(action, description) {
             return cartesian(action);
         case "jog_joint":
             if (slides(action.joint, description)) {
-                return words.slideJoint(action.joint, short(action.velocity * 100));
+                return words.slideJoint(jointName(action.joint), short(action.velocity * 100));
             }
-            return words.jogJoint(action.joint, short(degrees(action.velocity)));
+            return words.jogJoint(jointName(action.joint), short(degrees(action.velocity)));
         case "turn_joint":
             if (slides(action.joint, description)) {
-                return words.slideJointBy(action.joint, short(action.angle * 100));
+                return words.slideJointBy(jointName(action.joint), short(action.angle * 100));
             }
-            return words.turnJoint(action.joint, short(degrees(action.angle)));
+            return words.turnJoint(jointName(action.joint), short(degrees(action.angle)));
         case "pose":
             return words.pose(action.name);
         case "gripper": {
@@ -126,6 +138,5 @@ export const nameOf = (gallery) => (gallery.shared ? texts.first.whose.shared : 
 /** An error of the REST interface as one sentence. */
 export function describeError(error) {
     if (error.status === 0) return texts.errors.unreachable;
-    if (error.message) return texts.errors.server(error.message);
-    return texts.errors[error.code] || texts.errors.other(error.status);
+    return toldError(error) || texts.errors.other(error.status);
 }

@@ -58,7 +58,7 @@ def test_what_is_seen_becomes_advice(
 
 
 def test_every_advice_and_every_starter_sign_has_words(modules: Page) -> None:
-    words = run(modules, "texts/en.js", "return JSON.parse(JSON.stringify(m.texts.first))")
+    words = run(modules, "texts/texts.js", "return JSON.parse(JSON.stringify(m.texts.first))")
     codes = {
         "light": {"wait", "dark", "glare", "behind", "good"},
         "distance": {"wait", "none", "cut", "far", "near", "aside", "good"},

@@ -1,6 +1,6 @@
 // The step that looks whether the hand is seen well, and says what would be better.
 
-import { texts } from "../../texts/en.js";
+import { texts } from "../../texts/texts.js";
 import { button, el, icon, setIcon, setText } from "../dom.js";
 import { allGood, boxOf, judge, LINES, measure } from "./advice.js";
 import { drawing } from "./drawing.js";

@@ -1,6 +1,6 @@
 // How a gesture is held: the drawing of a starter gesture, else the gesture's own template.
 
-import { texts } from "../../texts/en.js";
+import { texts } from "../../texts/texts.js";
 import { el } from "../dom.js";
 
 const { signs } = texts.first;

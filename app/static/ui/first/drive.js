@@ -1,6 +1,6 @@
 // The guided drive: what to do next, beside the cockpit. It presses nothing by itself.
 
-import { texts } from "../../texts/en.js";
+import { texts } from "../../texts/texts.js";
 import { button, el, icon, setText } from "../dom.js";
 import { isDriving } from "../page.js";
 import { drawing, signOf } from "./drawing.js";

@@ -1,6 +1,6 @@
 // The first minutes: choose a picture, check it, teach the gestures, drive once. One sheet, step by step.
 
-import { texts } from "../../texts/en.js";
+import { texts } from "../../texts/texts.js";
 import { button, el, loadStyles } from "../dom.js";
 import { sourceChoices, sourceProblem } from "../operator-view.js";
 import { isDriving } from "../page.js";

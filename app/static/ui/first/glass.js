@@ -1,6 +1,6 @@
 // The webcam's picture as in a mirror, with the hand that was found and a ring that fills.
 
-import { texts } from "../../texts/en.js";
+import { texts } from "../../texts/texts.js";
 import { el } from "../dom.js";
 
 const WIDTH = 480;

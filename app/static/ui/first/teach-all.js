@@ -1,6 +1,6 @@
 // The step that teaches one gesture after another: shown as a drawing, taken when held still.
 
-import { texts } from "../../texts/en.js";
+import { texts, told } from "../../texts/texts.js";
 import { button, el, icon, isField, setText } from "../dom.js";
 import { isDriving } from "../page.js";
 import { describeError } from "../words.js";
@@ -127,8 +127,8 @@ export function teachStep({ store, video, progress, templateUrl, act, past, done
             return;
         }
         const problem = words.problems[found.code];
-        const why = found.code === "like" ? words.like(found.other) : problem || found.reason || words.problems.other;
-        const more = found.code === "like" ? found.reason : "";
+        const why = found.code === "like" ? words.like(found.other) : problem || told(found.reason) || words.problems.other;
+        const more = found.code === "like" ? told(found.reason) : "";
         weak = found.usable ? { gesture, pictures: found.pictures } : null;
         burst.next();
         setText(note, words.weak(why, more));

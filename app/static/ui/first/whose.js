@@ -1,6 +1,6 @@
 // Whose hand is it? Choose somebody's gestures, or begin somebody's own.
 
-import { texts } from "../../texts/en.js";
+import { texts } from "../../texts/texts.js";
 import { button, el, icon, setText } from "../dom.js";
 import { describeError, nameOf } from "../words.js";
 

@@ -1,8 +1,8 @@
 // The open glass box: every step of the recognition, drawn as it happens. Loaded when first opened.
 
-import { texts } from "../../texts/en.js";
+import { texts, told } from "../../texts/texts.js";
 import { bitmapFromBase64, el, setText } from "../dom.js";
-import { number, percent } from "../words.js";
+import { number, percent, short } from "../words.js";
 import { colours } from "./canvas.js";
 import { nearestList, room } from "./nearest.js";
 import { drawMask, drawMotion, drawRegion, drawTemplate, drawWrist } from "./pictures.js";
@@ -82,7 +82,7 @@ export function glassBox(element, store, { templateUrl }) {
         const shares = glass.histogram && glass.histogram.shares;
         const share = shares && percent(shares.reduce((sum, each) => sum + each, 0) / shares.length);
         steps.mask.tell(share ? words.maskValue(share) : words.maskNone, words.maskAlt(share));
-        const limit = percent(glass.motion_limit).replace(".0", "");
+        const limit = percent(glass.motion_limit, short);
         const moved = glass.mismatch === null || motion === null ? null : percent(motion);
         steps.motion.tell(
             moved && words.motionValue(moved, limit),
@@ -100,7 +100,7 @@ export function glassBox(element, store, { templateUrl }) {
         const both = number((axes[0] + axes[1]) * 100, 0);
         const first = glass.answer && glass.answer.gesture;
         steps.projection.tell(
-            query && words.projectionValue(`${both}%`),
+            query && words.projectionValue(texts.numbers.percent(both)),
             words.projectionAlt(first),
         );
     }
@@ -138,8 +138,8 @@ export function glassBox(element, store, { templateUrl }) {
         near.draw(glass.nearest);
         left.draw(glass.answer, detail.threshold);
         const { mode: way, why: because } = frame.mask;
-        setText(mode, words.modeValue(words.modes[way] || way, because));
-        setText(why, frame.reason || words.nothing);
+        setText(mode, words.modeValue(words.modes[way] || way, told(because)));
+        setText(why, told(frame.reason) || words.nothing);
         for (const bitmap of Object.values(bitmaps)) if (bitmap) bitmap.close();
         busy = false;
     }

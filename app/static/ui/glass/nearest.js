@@ -1,6 +1,6 @@
 // The templates that lie nearest to the hand, and the room that is left before it is refused.
 
-import { texts } from "../../texts/en.js";
+import { texts } from "../../texts/texts.js";
 import { el, setText } from "../dom.js";
 import { number } from "../words.js";
 

@@ -1,6 +1,6 @@
 // The gallery as one file.
 
-import { texts } from "../../texts/en.js";
+import { texts } from "../../texts/texts.js";
 import { el } from "../dom.js";
 import { withProgress } from "./progress.js";
 

@@ -1,6 +1,6 @@
 // A file of gestures into the gallery: what would happen is shown before it does.
 
-import { texts } from "../../texts/en.js";
+import { texts } from "../../texts/texts.js";
 import { button, el } from "../dom.js";
 import { withProgress } from "./progress.js";
 

@@ -1,7 +1,7 @@
 // The sheet that holds all gestures of a gallery: their pictures, names and states, how well they
 // are told apart, and the whole gallery as a file.
 
-import { texts } from "../../texts/en.js";
+import { texts } from "../../texts/texts.js";
 import { button, el, setText } from "../dom.js";
 import { describeError } from "../words.js";
 import { exporting } from "./exporting.js";

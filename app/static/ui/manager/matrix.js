@@ -1,6 +1,6 @@
 // How often each gesture is taken for each other one: a table, and what to do about the worst.
 
-import { texts } from "../../texts/en.js";
+import { texts } from "../../texts/texts.js";
 import { button, el } from "../dom.js";
 import { withProgress } from "./progress.js";
 

@@ -1,6 +1,6 @@
 // How far long work is, and a way to end it.
 
-import { texts } from "../../texts/en.js";
+import { texts } from "../../texts/texts.js";
 import { button, el, setText } from "../dom.js";
 import { describeError } from "../words.js";
 

@@ -1,6 +1,6 @@
 // One gesture in the manager: its picture, what it does, and its samples when they are unfolded.
 
-import { texts } from "../../texts/en.js";
+import { texts } from "../../texts/texts.js";
 import { button, el, setLabel, setText } from "../dom.js";
 import { describeAction } from "../words.js";
 

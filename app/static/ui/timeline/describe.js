@@ -1,6 +1,6 @@
 // One event in words: an icon, a title, and what there is to say more.
 
-import { texts } from "../../texts/en.js";
+import { texts } from "../../texts/texts.js";
 import { describeAction, nameOf, short } from "../words.js";
 
 const words = texts.timeline;

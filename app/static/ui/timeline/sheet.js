@@ -1,6 +1,6 @@
 // What happened, newest first: by day, with pictures, growing while it is looked at.
 
-import { language, texts } from "../../texts/en.js";
+import { language, texts } from "../../texts/texts.js";
 import { button, el, icon, setText } from "../dom.js";
 import { describeError } from "../words.js";
 import { describeEvent, GROUPS } from "./describe.js";

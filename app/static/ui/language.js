@@ -1,0 +1,34 @@
+// The choice of the page's language.
+
+import { keepLanguage, language, LANGUAGES, texts } from "../texts/texts.js";
+import { el } from "./dom.js";
+
+/** Buttons, one a language, each in its own words; their label is in all of them. */
+export function languageChoice() {
+    const tongues = Object.entries(LANGUAGES);
+    const label = tongues.flatMap(([lang, { word }], index) => [
+        ...(index ? [" · "] : []),
+        el("span", { lang, text: word }),
+    ]);
+    const buttons = tongues.map(([lang, { name }]) =>
+        el("button", {
+            type: "button",
+            lang,
+            text: name,
+            "aria-pressed": String(lang === language),
+            data: { language: lang },
+            onclick: () => {
+                if (lang === language) return;
+                keepLanguage(lang);
+                location.reload();
+            },
+        }),
+    );
+    return el(
+        "div",
+        { class: "language", role: "group", "aria-labelledby": "language-label" },
+        el("p", { id: "language-label" }, ...label),
+        el("div", { class: "row" }, ...buttons),
+        el("p", { class: "quiet", text: texts.language.note }),
+    );
+}
