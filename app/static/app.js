@@ -425,6 +425,11 @@ const wishes = {
         settings.set("glass", open ? "open" : "folded");
         sendView();
     },
+    language: async ({ language }) => {
+        settings.set("language", language);
+        await settings.flush();
+        location.reload(); // the page speaks it from its first word on
+    },
     "toggle-fine": () => {
         if (isDriving(store.state)) setSpeed({ fine: !store.state.fine });
     },

@@ -35,6 +35,9 @@ const marks = Array.from({ length: 6 }, (_, number) => `<${number}>`);
 return flat;
 """
 SAME = {
+    "manager.matrix.row",
+    "timeline.filters.server",
+    "timeline.seconds",
     "title", "stage.age", "glass.nothing", "glass.regionValue", "glass.templateValue",
     "gestures.noDistance", "latency.total", "jog.joint", "jog.pose", "first.teach.tile",
     "readout.joint", "readout.toolValue", "readout.placeValue", "readout.slideValue",

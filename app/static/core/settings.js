@@ -56,6 +56,11 @@ export class SettingsKeeper extends EventTarget {
         this.#timer = setTimeout(() => this.#save(), SAVE_AFTER_MS);
     }
 
+    /** Resolves when all that was set is kept, or could not be. */
+    async flush() {
+        await this.#save();
+    }
+
     /** Another person, or another connection: their choices may be others. */
     async #look() {
         const { gallery, hello, connection } = this.#store.state;

@@ -10,7 +10,6 @@ export const LANGUAGES = Object.freeze({
     de: { name: "Deutsch", word: "Sprache" },
 });
 
-const KEPT_AS = "language";
 const known = (language) => Object.hasOwn(LANGUAGES, language || "");
 
 /** The first of `wanted` (tags such as "de-AT") that there is; English otherwise. */
@@ -19,7 +18,7 @@ export function pickLanguage(chosen, wanted) {
     return [chosen, ...tongues].find(known) || "en";
 }
 
-export const language = pickLanguage(memory.get(KEPT_AS), navigator.languages || []);
+export const language = pickLanguage(memory.get("language"), navigator.languages || []);
 export const { texts, phrases } = await import(`./${language}.js`);
 
 const translate = translator(phrases, texts.numbers.decimal, texts.numbers.quote);
@@ -34,10 +33,4 @@ export function told(text) {
 export function toldError({ code, message }) {
     const plain = message ? translate(message) : null;
     return plain ?? texts.errors.codes[code] ?? message ?? "";
-}
-
-/** Remember a language; the page speaks it once it is loaded again. */
-export function keepLanguage(wanted) {
-    if (!known(wanted)) throw new Error(`no language "${wanted}"; there are: ${Object.keys(LANGUAGES)}`);
-    memory.set(KEPT_AS, wanted);
 }

@@ -1,7 +1,7 @@
 // The choice of the page's language.
 
-import { keepLanguage, language, LANGUAGES, texts } from "../texts/texts.js";
-import { el } from "./dom.js";
+import { language, LANGUAGES, texts } from "../texts/texts.js";
+import { el, want } from "./dom.js";
 
 /** Buttons, one a language, each in its own words; their label is in all of them. */
 export function languageChoice() {
@@ -17,10 +17,8 @@ export function languageChoice() {
             text: name,
             "aria-pressed": String(lang === language),
             data: { language: lang },
-            onclick: () => {
-                if (lang === language) return;
-                keepLanguage(lang);
-                location.reload();
+            onclick: ({ currentTarget }) => {
+                if (lang !== language) want(currentTarget, "language", { language: lang });
             },
         }),
     );
