@@ -141,6 +141,7 @@ return a.map(told);
             "der Reichweite",
         ),
         ("J2 is at its upper limit", "J2 ist am oberen Anschlag"),
+        ("J5 would pass its limit", "J5 käme über seinen Anschlag"),
         ("something that nobody has put into German", None),
         ("", None),
     ],
