@@ -362,8 +362,8 @@ async function showTimeline() {
     }
     const { Timeline } = await import("./ui/timeline/sheet.js");
     timeline ||= new Timeline(store, api);
-    const { content, focus, close } = await timeline.open();
-    sheets.show("timeline", texts.timeline.open, content, { onclose: close, focus });
+    const { content, close } = await timeline.open();
+    sheets.show("timeline", texts.timeline.open, content, { onclose: close });
 }
 
 /** Try out what the page needs, and say what is missing and how to mend it. */

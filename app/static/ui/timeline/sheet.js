@@ -51,9 +51,9 @@ export class Timeline {
             this.#filter,
             this.#save,
         );
+        // The filter does not get the focus: in a field the keys for stopping mean something else.
         return {
             content: [head, this.#list, this.#note, this.#older],
-            focus: this.#filter,
             close: () => {
                 this.#open = false;
             },
