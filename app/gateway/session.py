@@ -325,7 +325,7 @@ class OperatorSession:
             case TakeControl() | HandOver() | UseGallery():
                 self._queue(message)
             case _ if message.type == "stop":
-                self._begin_stop("the stop button was pressed", "button")
+                self._begin_stop("stop was pressed", "button")
             case _:
                 self._queue(message)
 
