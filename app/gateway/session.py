@@ -257,7 +257,7 @@ class OperatorSession:
             case TakeControl() | HandOver() | UseGallery():
                 self._queue(message)
             case _ if message.type == "stop":
-                self._stops.begin("the stop button was pressed", "button")
+                self._stops.begin("stop was pressed", "button")
             case _:
                 self._queue(message)
 

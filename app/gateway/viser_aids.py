@@ -1,5 +1,6 @@
 """What the 3D view shows beside the robot: where it should be, what it is near, where it may go."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,6 +35,7 @@ class SceneAids:
         server: Of the scene.
         urdf: The robot that is shown, whose geometry the ghost shares.
         workspace: The box that the tool may not leave, if there is one.
+        words: Links in plain words.
         root: Scene node of the robot's base.
     """
 
@@ -42,10 +44,12 @@ class SceneAids:
         server: "viser.ViserServer",
         urdf: "ViserUrdf",
         workspace: "WorkspaceModel | None",
+        words: Mapping[str, str],
         root: str = "/robot",
     ) -> None:
         self._server = server
         self._urdf = urdf
+        self._words = words
         self._root = f"{root}/aids"
         self._frame = server.scene.add_frame(self._root, show_axes=False)
         self._ghost: ViserUrdf | None = None
@@ -115,15 +119,16 @@ class SceneAids:
             colour = RED if near.distance < TOUCHING else AMBER if near.distance < NEAR else GREEN
             self._line.points = points
             self._line.colors = np.array(colour, np.uint8)
-            self._label.text = label_of(near)
+            self._label.text = label_of(near, self._words)
             self._label.position = points[0].mean(axis=0)
         if shown != self._line.visible:
             self._line.visible = self._label.visible = shown
 
 
-def label_of(near: Clearance) -> str:
+def label_of(near: Clearance, words: Mapping[str, str]) -> str:
     """The distance in mm and what it is to, as in ``48 mm to table``."""
-    return f"{near.distance * 1000:.0f} mm to {near.thing}"
+    thing = words.get(near.thing, near.thing.replace("_", " "))
+    return f"{near.distance * 1000:.0f} mm to {thing}"
 
 
 def box_edges(

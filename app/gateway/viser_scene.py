@@ -32,9 +32,10 @@ log = logging.getLogger(__name__)
 PERIOD_S = 0.05
 RETRY_S = 2.0
 """After the scene could not be built or updated."""
-CAMERA_POSITION = (2.0, -1.6, 1.55)
-CAMERA_LOOK_AT = (0.25, 0.0, 0.6)
-"""m, in the robot's base frame: from the front right, the table and the whole arm in view."""
+CAMERA_POSITION = (1.25, 2.45, 1.7)
+CAMERA_LOOK_AT = (0.5, -0.15, 0.65)
+"""m, in the robot's base frame: from its left, the table, the whole arm and, behind them, a
+camera that stands in the room."""
 BACKGROUND = (0.80, 0.84, 0.88)
 
 
@@ -249,7 +250,7 @@ class ViserScene:
         urdf = ViserUrdf(server, drawn_urdf(assets, DETAIL_M), root_node_name="/robot")
         self._pose_joints = posed(assets.model, urdf.get_actuated_joint_names())
         self._urdf = urdf
-        self._aids = SceneAids(server, urdf, assets.model.workspace)
+        self._aids = SceneAids(server, urdf, assets.model.workspace, assets.model.link_words)
         self._cameras = CameraViews(server, urdf, assets.model, self._robot.watch_camera)
         self._trail = Trail(server, "/trail")
 

@@ -12,10 +12,11 @@ import viser
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
 
-from app.gateway.viser_aids import box_edges
+from app.gateway.viser_aids import box_edges, label_of
 from app.gateway.viser_rehearsal import view_of
 from app.gateway.viser_scene import ViserScene
 from app.link.messages import DryRunPath, DryRunProblem, DryRunReport
+from benchmarks.scene_cost import CAMERA
 from tests.gateway.running import (
     NEAR,
     Running,
@@ -136,6 +137,13 @@ def test_the_ghost_shows_only_where_the_arm_is_not_where_it_should_be(
     assert scene.aids.told == "12 mm to table"
 
 
+def test_what_is_near_is_named_in_plain_words() -> None:
+    assert label_of(NEAR, {}) == "50 mm to table"
+    itself = NEAR.model_copy(update={"thing": "link3", "distance": 0.0612})
+    assert label_of(itself, {"link3": "forearm"}) == "61 mm to forearm"
+    assert label_of(NEAR.model_copy(update={"thing": "cube_red"}), {}) == "50 mm to cube red"
+
+
 def test_the_box_has_its_twelve_edges() -> None:
     edges = box_edges((0.0, 0.0, 0.0), (1.0, 2.0, 3.0))
     assert edges.shape == (12, 2, 3)
@@ -162,19 +170,6 @@ def test_without_the_robots_profile_the_view_says_so_and_goes_on(
 
 
 MINE, OTHERS = "my-view-0123456789", "your-view-0123456789"
-CAMERA = {
-    "type": "ViewerCameraMessage",
-    "wxyz": (1.0, 0.0, 0.0, 0.0),
-    "position": (2.0, -1.6, 1.5),
-    "fov": 0.8,
-    "near": 0.01,
-    "far": 100.0,
-    "image_height": 480,
-    "image_width": 640,
-    "look_at": (0.2, 0.0, 0.6),
-    "up_direction": (0.0, 0.0, 1.0),
-}
-"""Who has told viser where their camera is counts as connected."""
 
 
 def look(server: Running, view: str) -> ClientConnection:
