@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from app.gateway.gallery import DATABASE_FILE, starter_set
-from app.gestures import GestureStore, NewGesture, read_set
+from app.gateway.gallery import DATABASE_FILE
 from tests.e2e.conftest import OpenPage
 from tests.e2e.running import Server, start_server, stop_server, wait_for
+from tests.small_gallery import fill_small
 
 pytestmark = [pytest.mark.e2e, pytest.mark.timeout(600)]
 
@@ -21,13 +21,7 @@ UP = "window.farhand.state.gestures.find((one) => one.name === 'up')"
 def server(tmp_path: Path) -> Iterator[Server]:
     """A server with two pictures of each gesture: what is changed is learned anew at once."""
     (tmp_path / "data").mkdir()
-    starter = starter_set()
-    assert starter is not None
-    store = GestureStore(f"sqlite:///{tmp_path / 'data' / DATABASE_FILE}", None)
-    store.put_all(
-        [NewGesture(entry.name, entry.action, entry.templates[:2]) for entry in read_set(starter)]
-    )
-    store.close()
+    fill_small(tmp_path / "data" / DATABASE_FILE)
     running = start_server(tmp_path)
     yield running
     stop_server(running)

@@ -11,15 +11,16 @@ import httpx
 import pytest
 
 from app.gateway import jobs, rest_matrix
-from app.gateway.gallery import DATABASE_FILE, starter_set
+from app.gateway.gallery import DATABASE_FILE
 from app.gateway.undo_offer import HEADER
-from app.gestures import GestureStore, NewGesture, read_set
+from app.gestures import NewGesture
 from app.gestures.exchange import entries_of
 from app.gestures.setwriter import zip_stream
 from app.link.actions import Home
 from tests.gateway.running import Running, wait_for
 from tests.gateway.test_rest_gestures import JOG, enrol, error
 from tests.gestures.conftest import template
+from tests.small_gallery import fill_small
 
 Hand = Callable[..., bytes]
 ZIP = {"Content-Type": "application/zip"}
@@ -29,17 +30,7 @@ ZIP = {"Content-Type": "application/zip"}
 def small_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Four gestures with two samples each: these tests change them again and again."""
     path = tmp_path_factory.mktemp("manager") / DATABASE_FILE
-    starter = starter_set()
-    assert starter is not None
-    store = GestureStore(f"sqlite:///{path}", None)
-    store.put_all(
-        [
-            NewGesture(entry.name, entry.action, entry.templates[:2])
-            for entry in read_set(starter)
-            if entry.name in ("up", "down", "close", "home")
-        ]
-    )
-    store.close()
+    fill_small(path, "up", "down", "close", "home")
     return path
 
 
