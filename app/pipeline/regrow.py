@@ -23,6 +23,10 @@ LIKE = 0.5
 hand."""
 THIN = 0.55
 """Palm radii: a piece into which a circle of this radius fits is no finger."""
+BEYOND, LEAST = 2, 12
+"""Pixels of the share: only what reaches farther than the first from the hand, with so many pixels,
+is a finger. Less is the hand's rim, which is a little other in every frame: giving that back would
+look like motion."""
 MOST = 0.35
 """Of the hand's pixels: more cannot be fingers that were lost."""
 FEWEST = 60
@@ -61,10 +65,15 @@ def regrow(share: F32, seen: U8, threshold: float) -> F32:
     more[(thick != 0) & (cv2.dilate(hand, _RIM, iterations=2) == 0)] = 0
     _, labels = cv2.connectedComponents(more | hand)
     more[~np.isin(labels, np.unique(labels[hand != 0]))] = 0
-    grown = cv2.countNonZero(more)
-    if not grown or grown > MOST * cv2.countNonZero(hand):
+    fingers = more.copy()
+    fingers[cv2.dilate(hand, _RIM, iterations=BEYOND) != 0] = 0
+    if cv2.countNonZero(fingers) < LEAST:
         return share
-    return np.where(more != 0, np.float32(1.0), share)
+    for _ in range(2 * BEYOND):  # back to the hand, but not along its rim
+        fingers = cv2.dilate(fingers, _RIM) & more
+    if cv2.countNonZero(fingers) > MOST * cv2.countNonZero(hand):
+        return share
+    return np.where(fingers != 0, np.float32(1.0), share)
 
 
 def colour_axis(colours: F32, hand: NDArray[np.bool_], rest: NDArray[np.bool_]) -> F32 | None:

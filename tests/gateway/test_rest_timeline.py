@@ -16,6 +16,7 @@ from app.config import MemorySettings
 from app.gateway.diary.diary import FILE
 from app.gateway.tokens import TokenStore
 from app.link.messages import Transition
+from tests.gateway.operating import rest, show_until, take_and_arm
 from tests.gateway.running import (
     Operator,
     Running,
@@ -25,7 +26,6 @@ from tests.gateway.running import (
     settings_for,
     wait_for,
 )
-from tests.gateway.test_operator_ws import rest, show_until, take_and_arm
 from tests.gateway.test_rest_galleries import make
 from tests.gateway.test_rest_gestures import JOG, enrol, error
 

@@ -2,6 +2,7 @@
 
 import json
 import time
+from typing import Any
 
 from app.gateway.drive import Lease, Situation
 from app.gateway.held_keys import HeldKeys
@@ -27,13 +28,22 @@ class Robot:
         self.commands.append(command)
 
 
+class NoDiary:
+    """Notes nothing."""
+
+    def jog(self, jog: Jog, decision: object) -> None:
+        pass
+
+
 class Keys(SessionKeys):
     """Keys of a session that holds the lease, or does not."""
 
     def __init__(self) -> None:
         self.robot, self.outbox, self.lease = Robot(), Outbox(), True
         held = HeldKeys(Counter(), Counter())
-        super().__init__(held, 500, self.robot, self.outbox, Metrics())  # type: ignore[arg-type]
+        diary: Any = NoDiary()
+        robot: Any = self.robot
+        super().__init__(held, 500, robot, self.outbox, Metrics(), diary)
 
     def press(self, hold: int, tick: int | None = None) -> None:
         jog = Jog(type="jog", hold=hold, action=UP, tick=tick_ms() if tick is None else tick)

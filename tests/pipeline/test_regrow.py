@@ -60,6 +60,21 @@ def test_no_more_comes_back_than_fingers_can_be():
     assert np.count_nonzero(grown) <= (1 + MOST) * np.count_nonzero(share)
 
 
+def test_the_rim_of_a_hand_is_no_finger():
+    share, seen = scene()
+    share[:] = 0
+    cv2.circle(share, FIST[0], FIST[1] - 2, 1.0, cv2.FILLED)
+    assert regrow(share, seen, THRESHOLD) is share
+
+
+def test_a_finger_brings_no_rim_along():
+    share, seen = scene(FINGER)
+    cv2.circle(share, *FIST, 0.0, 2)
+    grown = regrow(share, seen, THRESHOLD)
+    assert (grown[16:30, 45:48] == 1).all()
+    assert np.array_equal(grown[45:, :], share[45:, :])
+
+
 def test_colours_that_are_not_far_apart_change_nothing():
     share, seen = scene(FINGER, wall=(165, 188, 224), spread=12)
     assert regrow(share, seen, THRESHOLD) is share
