@@ -19,6 +19,7 @@ LIVE = (
     "e2e/test_keys.py",
     "e2e/test_pick_and_place.py",
     "e2e/test_slow_link.py",
+    "e2e/test_stops.py",
     "e2e/test_timeline.py",
     "gateway/test_real_robot.py",
     "robot/test_dry_run.py",

@@ -1,12 +1,13 @@
 """REST: several people keep galleries of their own."""
 
 import asyncio
+import contextlib
 from typing import Any
 
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
-from app.errors import Invalid
+from app.errors import FarhandError, Invalid
 from app.gateway.bodies import GALLERY_BODY
 from app.gateway.errors import BAD_BODY
 from app.gateway.json_bodies import read_object
@@ -88,6 +89,9 @@ async def delete_gallery(request: Request, id: str) -> Response:
     """Forget a gallery with all its gestures; who uses it goes on with the shared one."""
     hub = hub_of(request)
     await asyncio.to_thread(hub.store.galleries.delete, id)
+    # The diary forgets those that it knew; one that came and went between two of its looks, here.
+    with contextlib.suppress(FarhandError):
+        await asyncio.to_thread(lambda: hub.diary.settings.forget(id))
     await hub.gallery_changed()
     return Response(status_code=204)
 

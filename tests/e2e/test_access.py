@@ -20,8 +20,8 @@ TAGS = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
 AXE = """
 async (tags) => {
     await new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)));
-    // What moves is judged where it comes to rest.
-    await Promise.all(document.getAnimations().map((each) => each.effect.getTiming().iterations === Infinity || each.finished));
+    // What moves is judged where it comes to rest; what is taken away meanwhile rejects.
+    await Promise.all(document.getAnimations().map((each) => each.effect.getTiming().iterations === Infinity || each.finished.catch(() => {})));
     // The 3D view is viser's own page.
     const found = await axe.run(document, { runOnly: tags, resultTypes: ["violations"], iframes: false });
     return found.violations.flatMap(({ id, nodes }) =>
