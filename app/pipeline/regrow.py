@@ -69,7 +69,7 @@ def regrow(share: F32, seen: U8, threshold: float) -> F32:
     if cv2.countNonZero(fingers) < LEAST:
         return share
     for _ in range(2 * BEYOND):  # back to the hand, but not along its rim
-        fingers = cv2.dilate(fingers, _RIM) & more
+        fingers = np.asarray(cv2.dilate(fingers, _RIM), np.uint8) & more
     if cv2.countNonZero(fingers) > MOST * cv2.countNonZero(hand):
         return share
     return np.where(fingers != 0, np.float32(1.0), share)
