@@ -15,8 +15,8 @@ from app.pipeline.types import F32, U8
 HAND, REST = 0.9, 0.1
 """Share of hand from which a pixel is a sample of the hand, and up to which of the rest."""
 APART = 8.0
-"""Standard deviations between the two colours from which colour counts. At 5, 30 of 254 whole webcam
-pictures of rooms were changed, parts of faces and sleeves among what the hand was given; at 8, one."""
+"""Standard deviations between the two colours from which colour counts. At 5, 30 of 254 whole
+webcam pictures of rooms were changed, with parts of faces and sleeves in the hand; at 8, one."""
 LIKE = 0.5
 """On the way from the rest's mean colour (0) to the hand's (1): from here a pixel is like the
 hand."""
