@@ -69,7 +69,8 @@ const pictures = new PictureReport(
     (camera, shown) => latency.picture(camera, shown),
 );
 let jog = { down: () => false, up: () => {}, pad: () => {} }; // until somebody drives by keys
-const counts = { hello: 0, frame: 0, gesture: 0, robot: 0, gallery: 0, pong: 0, error: 0, lastError: null };
+const counts = { hello: 0, frame: 0, gesture: 0, robot: 0, gallery: 0, pong: 0, error: 0 };
+let lastError = null;
 
 // What is shown
 
@@ -247,7 +248,7 @@ function greeted() {
 }
 
 function refused(message) {
-    counts.lastError = message;
+    lastError = message;
     if (galleries.refused(message)) return;
     if (message.code === "control_kept") control.refused();
     if (Number.isFinite(message.seq) && message.seq !== null) {
@@ -453,7 +454,15 @@ byId("timeline-open").addEventListener("click", showTimeline);
 byId("teach-open").addEventListener("click", () => teach());
 byId("manage-open").addEventListener("click", manage);
 
-window.farhand = inspection({ store, sender, feeds, counts, shown: () => pictures.shown, reading });
+window.farhand = inspection({
+    store,
+    sender,
+    feeds,
+    counts,
+    error: () => lastError,
+    shown: () => pictures.shown,
+    reading,
+});
 
 link.open();
 source.listCameras();

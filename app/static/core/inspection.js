@@ -6,7 +6,7 @@
  * shown, `shown` what the newest of them is ({tick, takenAt, shownAt}), `latency` where a frame's time
  * goes, `error` the newest `error` message.
  */
-export function inspection({ store, sender, feeds, counts, shown, reading }) {
+export function inspection({ store, sender, feeds, counts, error, shown, reading }) {
     return Object.freeze({
         get state() {
             return { ...store.state };
@@ -24,11 +24,10 @@ export function inspection({ store, sender, feeds, counts, shown, reading }) {
             return store.state.gesture;
         },
         get error() {
-            return counts.lastError;
+            return error();
         },
         get counts() {
-            const { lastError, ...came } = counts;
-            return came;
+            return { ...counts };
         },
         get frames() {
             const { counts: became, latencyMs, rate, level, width, height } = sender;
