@@ -7,15 +7,18 @@ from typing import Any
 
 import pytest
 
-from tests.scheduling import Apart, give_way
+from tests.scheduling import LongestFirst, is_live
 
 
-def pytest_configure(config: pytest.Config) -> None:
-    give_way(config)
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if is_live(item.nodeid):
+            item.add_marker("live")
 
 
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Apart:
-    return Apart(config, log)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LongestFirst:
+    return LongestFirst(config, log)
 
 
 @pytest.fixture

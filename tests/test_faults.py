@@ -18,8 +18,6 @@ from benchmarks.rig import Rig
 from benchmarks.standstill import Outcome, gateway_killed, gateway_stopped, network_blackholed
 from tests.proxy import Proxy
 
-pytestmark = pytest.mark.timeout(300)
-
 
 @pytest.fixture(scope="module")
 def module_rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:

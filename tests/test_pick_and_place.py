@@ -1,10 +1,6 @@
 """The cube into the tray by gestures alone, by a virtual clock: whatever else the machine does."""
 
-import pytest
-
 from benchmarks.pick_and_place import ASKED_S, virtual_run
-
-pytestmark = pytest.mark.timeout(400)
 
 
 def test_the_cube_is_put_into_the_tray_and_in_time() -> None:

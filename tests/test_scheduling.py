@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tests.scheduling import LIVE, SECONDS, Apart, keeps_real_time, scope_of
+from tests.scheduling import LIVE, SECONDS, LongestFirst, is_live, keeps_real_time, scope_of
 
 FOLDER = Path(__file__).parent
 
@@ -34,7 +34,7 @@ def handed_out(tests: list[str], workers: int) -> list[list[str]]:
         getvalue=lambda name: {"tx": [f"{workers}*popen"]}[name],
         option=SimpleNamespace(loadscopereorder=True, debug=False),
     )
-    scheduling = Apart(config)
+    scheduling = LongestFirst(config)
     nodes: list[Any] = [Worker(f"gw{number}", tests) for number in range(workers)]
     for node in nodes:
         scheduling.add_node(node)
@@ -70,25 +70,26 @@ def test_every_test_is_handed_out_once(workers: int) -> None:
     assert sorted(test for each in given for test in each) == sorted(MANY)
 
 
-@pytest.mark.parametrize("workers", [2, 3])
-def test_what_is_live_is_the_first_workers_and_its_first(workers: int) -> None:
-    live = [test for test in MANY if scope_of(test) == "live"]
-    assert len(live) == 11
-    assert handed_out(MANY, workers)[0][: len(live)] == live
-
-
 def test_the_longest_go_first_and_files_stay_whole() -> None:
     first, second = (
         [scope for scope, _ in groupby(each, scope_of)] for each in handed_out(MANY, 2)
     )
-    assert second[:2] == ["test_pick_and_place.py", "gateway/test_auth.py"]
-    assert first[:2] == ["live", "pipeline/test_mask.py"]
-    assert len(first + second) == len(set(first + second)) == 6
+    assert {first[0], second[0]} == {"test_pick_and_place.py", "gateway/test_auth.py"}
+    assert len(first + second) == len(set(first + second)) == len({scope_of(one) for one in MANY})
+
+
+def test_what_drives_a_node_is_marked_and_nothing_else(request: pytest.FixtureRequest) -> None:
+    assert is_live("tests/e2e/test_drive.py::test_one[a/b]")
+    assert not is_live("tests/robot/test_controller.py::test_one")
+    items = request.session.items
+    assert all(
+        (item.get_closest_marker("live") is not None) == is_live(item.nodeid) for item in items
+    )
 
 
 def test_a_folder_whose_files_share_something_stays_whole() -> None:
     assert scope_of("tests/e2e/units/test_held.py::test_one") == "e2e/units"
-    assert scope_of("tests/e2e/test_people.py::test_one") == "e2e/test_people.py"
+    assert scope_of("tests/e2e/test_remote.py::test_one") == "e2e/test_remote.py"
 
 
 def test_what_only_computes_keeps_no_real_time() -> None:

@@ -17,6 +17,8 @@ QUICK_S = 0.05
 LATE_IN_A_ROW = 2
 STEADY_S = 3.0
 """So long acknowledgements must be quick before the next larger level is tried."""
+MOSTLY = 0.9
+"""Part of them: a busy computer holds one up now and then, at any level."""
 LONGEST_STEADY_S = 60.0
 """A level that proves too much is tried again after twice as long, and at last after this."""
 WINDOW_S = 30.0
@@ -75,7 +77,11 @@ class PicturePace:
         """Pictures sent before this say nothing about the present level."""
         self._quickest = Quickest()
         self._late = 0
-        self._quick_since: float | None = None
+        self._late_from = 0.0
+        """Pictures sent before this were held up by what was counted."""
+        self._answers = self._quick = 0
+        self._since: float | None = None
+        """When the first of these answers came."""
         self._steady = STEADY_S
         self._raised_at = float("-inf")
         self._due = 0.0
@@ -116,30 +122,45 @@ class PicturePace:
         took = now - sent
         waited = took - self._quickest(took, now)
         if sent >= self._judged_from:
-            self._judge(waited, now)
+            self._judge(sent, waited, now)
 
-    def _judge(self, waited: float, now: float) -> None:
-        self._late = self._late + 1 if waited > LATE_S else 0
-        if waited > QUICK_S:
-            self._quick_since = None
-        elif self._quick_since is None:
-            self._quick_since = now
+    def _judge(self, sent: float, waited: float, now: float) -> None:
+        if self._since is None:
+            self._since = now
+        self._answers += 1
+        self._quick += waited <= QUICK_S
+        if waited <= LATE_S:
+            self._late = 0
+        elif sent >= self._late_from:
+            # What was under way then was held up by the same; a queue is there afterwards, too.
+            self._late += 1
+            self._late_from = now
         if self._late >= LATE_IN_A_ROW and self._level + 1 < len(LEVELS):
             if now - self._raised_at < self._steady:
                 self._steady = min(2 * self._steady, LONGEST_STEADY_S)
             self._go(self._level + 1, now)
-        elif self._quick_since is not None and now - self._quick_since >= self._steady:
+        elif now - self._since >= self._steady:
+            if self._quick < MOSTLY * self._answers:
+                self._begin()
+                return
             if now - self._raised_at > LONGEST_STEADY_S:
                 self._steady = STEADY_S
             if self._level:
                 self._raised_at = now
                 self._go(self._level - 1, now)
+            else:
+                self._begin()
 
     def _go(self, level: int, now: float) -> None:
         self._level = level
         self._judged_from = now
+        self._begin()
+
+    def _begin(self) -> None:
         self._late = 0
-        self._quick_since = None
+        self._late_from = 0.0
+        self._answers = self._quick = 0
+        self._since = None
 
 
 def acknowledged(text: str | None) -> int | None:

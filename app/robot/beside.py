@@ -1,8 +1,13 @@
 """What the processes beside a node have in common: its newest state, and when to end."""
 
+import ctypes
 import os
+import signal
+import sys
 import threading
 import time
+from contextlib import suppress
+from pathlib import Path
 
 import zenoh
 
@@ -10,6 +15,32 @@ CHECK_PERIOD_S = 0.5
 """How often the parent and the link are looked at."""
 LINK_PATIENCE_S = 5.0
 """The link may be gone this long (a node that restarts) before the process gives up."""
+
+
+_PR_SET_PDEATHSIG = 1
+"""prctl(2), linux/prctl.h."""
+
+
+def give_way(niceness: int, autogroup: Path = Path("/proc/self/autogroup")) -> None:
+    """Let everything else on this machine go first, and end with the thread that started this.
+
+    Linux weighs sessions against each other before it weighs the processes of one (sched(7), "the
+    autogroup feature"): niceness alone would only let this process's own session go before, and
+    half a processor would be taken from a browser or a gateway of another one. So this one gets a
+    session of its own that is as nice. That takes it out of the group which is killed with a hung
+    node; the kernel kills it instead, when its parent is gone.
+
+    Args:
+        niceness: 0 to 19.
+        autogroup: Where the kernel is told; absent where it groups nothing.
+    """
+    os.nice(niceness)
+    with suppress(PermissionError):  # already the first of its session
+        os.setsid()
+    with suppress(OSError):
+        autogroup.write_text(str(niceness))
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
 
 
 class NewestState:

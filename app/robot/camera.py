@@ -24,7 +24,7 @@ from app.errors import FarhandError, WorldError
 from app.link.header import FrameHeader
 from app.link.messages import State, key
 from app.link.session import open_session
-from app.robot.beside import Alive, NewestState
+from app.robot.beside import Alive, NewestState, give_way
 from app.robot.sim.renderer import Renderer
 
 _log = logging.getLogger(__name__)
@@ -32,8 +32,8 @@ _log = logging.getLogger(__name__)
 MAX_RATE_HZ = 30.0
 """Pictures a second of each camera, at most."""
 JPEG_QUALITY = 82
-NICENESS = 10
-"""The control loop goes first."""
+NICENESS = 19
+"""Control, the operator's frames and a browser beside them go first."""
 IDLE_S = 0.05
 """Between two looks for viewers or for a new state."""
 
@@ -153,9 +153,9 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parent = os.getppid()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
-    # A Ctrl-C in the terminal reaches the whole group; the node ends this process in its own time.
+    # A Ctrl-C in the terminal is the node's business, which ends this process in its own time.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.nice(NICENESS)
+    give_way(NICENESS)
     cv2.setNumThreads(1)  # the other cores are for control and for the gateway
     try:
         renderer = open_renderer(options.profile, options.renderer)

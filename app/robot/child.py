@@ -39,16 +39,7 @@ class Child:
     def close(self) -> None:
         """End the process."""
         self._closing.set()
-        self._thread.join(_STOP_S + 1)
-        process = self._process
-        if process is None:
-            return
-        process.terminate()
-        try:
-            process.wait(_STOP_S)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+        self._thread.join(2 * _STOP_S + 1)
 
     def _run(self) -> None:
         pause = _FIRST_PAUSE_S
@@ -66,9 +57,20 @@ class Child:
                         code = self._process.wait(_CHECK_S)
                     lived += _CHECK_S
                 if code is None:
+                    self._end(self._process)
                     return
                 if lived > 30:
                     pause = _FIRST_PAUSE_S
                 log.warning("the %s ended (%s), starting again in %.0f s", self._name, code, pause)
                 self._closing.wait(pause)
             pause = min(2 * pause, _LONGEST_PAUSE_S)
+
+    @staticmethod
+    def _end(process: subprocess.Popen[bytes]) -> None:
+        """By the thread that started it; the kernel kills what outlives that one (`give_way`)."""
+        process.terminate()
+        try:
+            process.wait(_STOP_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()

@@ -23,7 +23,7 @@ import { Stopper } from "./core/stopper.js";
 import { Store } from "./core/store.js";
 import { texts, told, toldError } from "./texts/texts.js";
 import { Control } from "./ui/control.js";
-import { setText } from "./ui/dom.js";
+import { setHidden, setText } from "./ui/dom.js";
 import { dockButtons, steps, stopButton } from "./ui/dock.js";
 import { gestureList } from "./ui/gesture-list.js";
 import { glassFold } from "./ui/glass-fold.js";
@@ -146,7 +146,7 @@ async function loadJog() {
 }
 
 store.watch(["connection", "hello", "robot", "source"], (state) => {
-    byId("jog").hidden = !byKeys();
+    setHidden(byId("jog"), !byKeys());
     setText(byId("operator-title"), byKeys() ? texts.jog.title : texts.headings.operator);
     if (byKeys() && !jogAsked) loadJog();
     if (byKeys() && isDriving(state)) held.start();

@@ -12,9 +12,25 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, ConsoleMessage, Page, Playwright, sync_playwright
+from playwright.sync_api import (
+    Browser,
+    ConsoleMessage,
+    Page,
+    Playwright,
+    expect,
+    sync_playwright,
+)
 
-from tests.e2e.running import BASE_ARGUMENTS, STATIC, Server, start_server, stop_server
+from tests.e2e.running import (
+    BASE_ARGUMENTS,
+    PATIENCE_S,
+    STATIC,
+    Server,
+    start_server,
+    stop_server,
+)
+
+expect.set_options(timeout=PATIENCE_S * 1e3)
 
 ARTIFACTS = Path(__file__).parents[2] / "test-artifacts"
 
@@ -153,6 +169,7 @@ def open_page(browsers: Browsers, request: pytest.FixtureRequest) -> Iterator[Op
             arguments.append("--use-fake-ui-for-media-stream")
         browser = browsers.take(*arguments)
         page = browser.new_page(viewport={"width": width, "height": height})
+        page.set_default_timeout(PATIENCE_S * 1e3)
         opened.append((browser, tuple(arguments), page))
         if not allow_errors:
 

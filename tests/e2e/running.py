@@ -29,6 +29,9 @@ BASE_ARGUMENTS = [
 ]
 
 
+PATIENCE_S = 120.0
+"""How long a page or a server is waited for; a slow machine may take its time."""
+
 AT_HOME = 0.02
 """rad; the brakes let the arm sink by less."""
 
@@ -45,7 +48,7 @@ class Server:
 
     def api(self) -> httpx.Client:
         return httpx.Client(
-            base_url=self.url, headers={"Authorization": f"Bearer {TOKEN}"}, timeout=20
+            base_url=self.url, headers={"Authorization": f"Bearer {TOKEN}"}, timeout=60
         )
 
     def node(self) -> psutil.Process:
@@ -98,7 +101,7 @@ def stop_server(server: Server) -> None:
         server.process.stdout.close()
 
 
-def put_at_rest(server: Server, seconds: float = 60.0) -> None:
+def put_at_rest(server: Server, seconds: float = PATIENCE_S) -> None:
     """Bring a server's robot back to where it is after a start: disarmed, at home, nobody's.
 
     For the next test on the same server. Moves no arm: a node whose arm is elsewhere is killed, and
@@ -130,7 +133,7 @@ def put_at_rest(server: Server, seconds: float = 60.0) -> None:
         until("disarmed", lambda robot: robot["mode"] == "disarmed" and robot["fault"] is None)
 
 
-def wait_for(page: Page, expression: str, seconds: float = 60.0) -> None:
+def wait_for(page: Page, expression: str, seconds: float = PATIENCE_S) -> None:
     """Wait until a JavaScript expression is true on the page.
 
     Playwright's own ``wait_for_function`` evaluates text inside the page, which the page's content

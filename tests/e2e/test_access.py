@@ -12,7 +12,7 @@ from tests.e2e.conftest import ARTIFACTS, OpenPage
 from tests.e2e.running import Server, start_server, stop_server
 from tests.e2e.walk import EVERY_LOOK, TWO_LOOKS, opened, walk
 
-pytestmark = [pytest.mark.e2e, pytest.mark.timeout(600)]
+pytestmark = pytest.mark.e2e
 
 THOROUGH = bool(os.environ.get("FARHAND_EVERY_LOOK"))
 """Both sizes in both schemes, with a picture of each; twice as slow."""

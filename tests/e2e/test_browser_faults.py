@@ -8,7 +8,7 @@ import pytest
 from benchmarks.observer import STANDSTILL_MS
 from benchmarks.standstill import NotAtFullSpeed, scenario
 
-pytestmark = [pytest.mark.e2e, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.e2e
 
 
 @pytest.mark.parametrize("name", ["browser killed", "browser stopped"])

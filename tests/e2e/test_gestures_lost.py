@@ -11,7 +11,7 @@ from app.gestures import recovery
 from tests.e2e.conftest import OpenPage
 from tests.e2e.running import start_server, stop_server
 
-pytestmark = [pytest.mark.e2e, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.e2e
 
 
 def test_lost_gestures_are_told_until_they_are_accepted(
@@ -24,9 +24,9 @@ def test_lost_gestures_are_told_until_they_are_accepted(
     try:
         page = open_page(server.link, allow_errors=True)  # the server ends first
         notice = page.locator("#notices .notice.bad")
-        expect(notice).to_contain_text("cannot be armed", timeout=60_000)
+        expect(notice).to_contain_text("cannot be armed")
         place = place_of(Settings(data_dir=data))
         assert place is not None and recovery.accept(place)
-        expect(notice).to_be_hidden(timeout=60_000)
+        expect(notice).to_be_hidden()
     finally:
         stop_server(server)

@@ -8,7 +8,6 @@ from playwright.sync_api import Page, expect
 from tests.e2e.conftest import OpenPage
 from tests.e2e.running import Server, wait_for
 
-SLOW = 60_000
 Press = Callable[[], object]
 PAD = """
 window.pad = null;
@@ -65,7 +64,7 @@ def test_the_arm_moves_while_a_key_or_a_button_or_a_stick_is_held(
     page.goto(server.link)
     wait_for(page, "window.farhand?.robot?.mode === 'disarmed'")
     page.click("#choose-keys")
-    expect(page.locator("#jog [data-move=forward]")).to_be_visible(timeout=SLOW)
+    expect(page.locator("#jog [data-move=forward]")).to_be_visible()
 
     expect(page.locator("#operator-title")).to_have_text("Keys")
 
@@ -75,11 +74,11 @@ def test_the_arm_moves_while_a_key_or_a_button_or_a_stick_is_held(
     page.keyboard.down("ArrowUp")
     page.click("#btn-arm")
     wait_for(page, "window.farhand.robot.armed")
-    expect(page.locator("#sentence")).to_contain_text("let go and press it again", timeout=SLOW)
+    expect(page.locator("#sentence")).to_contain_text("let go and press it again")
     assert page.evaluate("window.farhand.robot.mode") != "moving"
     page.keyboard.up("ArrowUp")
     rests(page)
-    expect(page.locator("#sentence")).to_have_text("Ready. Hold a button or a key.", timeout=SLOW)
+    expect(page.locator("#sentence")).to_have_text("Ready. Hold a button or a key.")
 
     keys = page.keyboard
     forward = page.locator("#jog [data-move=forward]")

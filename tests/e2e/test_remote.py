@@ -16,7 +16,7 @@ from app.gateway.tls import FOLDER, LocalAuthority
 from tests.e2e.conftest import OpenPage
 from tests.e2e.running import TOKEN, start_server, stop_server, wait_for
 
-pytestmark = [pytest.mark.e2e, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.e2e
 
 
 def check_page(page: Page) -> None:
@@ -32,7 +32,7 @@ def check_page(page: Page) -> None:
     page.wait_for_selector("#view-3d iframe, #show-3d")
     if page.is_visible("#show-3d"):
         page.click("#show-3d")
-    page.frame_locator("#view-3d iframe").locator("canvas").first.wait_for(timeout=60_000)
+    page.frame_locator("#view-3d iframe").locator("canvas").first.wait_for()
     # Stopping is a request that changes something: its origin has to be ours.
     page.keyboard.press("Space")
     wait_for(page, "window.farhand.robot?.mode === 'stopped'")

@@ -13,7 +13,7 @@ from tests.slow_link import SlowLink
 
 __all__ = ["showing_up"]
 
-pytestmark = [pytest.mark.e2e, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.e2e
 
 
 @pytest.fixture

@@ -10,9 +10,8 @@ from tests.e2e.conftest import OpenPage
 from tests.e2e.person import person_script
 from tests.e2e.running import TOKEN, Server, wait_for
 
-pytestmark = [pytest.mark.e2e, pytest.mark.timeout(400)]
+pytestmark = pytest.mark.e2e
 
-SLOW = 60_000
 FACE = """() => {
     const text = (id) => document.getElementById(id).innerText;
     const seen = [...document.querySelectorAll("#dock-buttons button, #steps li")];
@@ -33,9 +32,9 @@ FACE = """() => {
 def stopped(page: Page, why: str) -> dict[str, Any]:
     """What the page shows once the robot has stopped."""
     wait_for(page, "window.farhand.robot?.mode === 'stopped'")
-    expect(page.locator("#sentence")).to_contain_text(f"Stopped: {why}", timeout=SLOW)
-    expect(page.locator("#stop")).to_have_attribute("data-state", "stopped", timeout=SLOW)
-    expect(page.locator("#notices .notice")).to_have_count(0, timeout=SLOW)
+    expect(page.locator("#sentence")).to_contain_text(f"Stopped: {why}")
+    expect(page.locator("#stop")).to_have_attribute("data-state", "stopped")
+    expect(page.locator("#notices .notice")).to_have_count(0)
     face = page.evaluate(FACE)
     assert isinstance(face, dict)
     return face

@@ -10,9 +10,8 @@ from tests.e2e.conftest import OpenPage
 from tests.e2e.running import start_server, stop_server, wait_for
 from tests.e2e.test_drive import start_driving
 
-pytestmark = [pytest.mark.e2e, pytest.mark.timeout(400)]
+pytestmark = pytest.mark.e2e
 
-SLOW = 60_000
 WIDE = "(document.querySelector('{}')?.naturalWidth ?? 0) > 0"
 
 

@@ -10,7 +10,6 @@ from playwright.sync_api import Page, WebSocketRoute, expect
 from tests.e2e.person import person_script
 from tests.e2e.running import Server, wait_for
 
-SLOW = 60_000
 MINE = "window.farhand.robot.controller === window.farhand.hello.session"
 
 
@@ -64,11 +63,11 @@ def opened(page: Page, server: Server, language: str = "en") -> Wire:
 
 def press(page: Page, where: str) -> None:
     """A click that does not ask what lies over the button."""
-    page.locator(where).dispatch_event("click", timeout=SLOW)
+    page.locator(where).dispatch_event("click")
 
 
 def sheet(page: Page, name: str) -> None:
-    page.wait_for_selector(f"#sheet-{name}", timeout=SLOW)
+    page.wait_for_selector(f"#sheet-{name}")
 
 
 def close(page: Page) -> None:
@@ -91,7 +90,7 @@ def _sheets(page: Page) -> Iterator[str]:
     yield "help"
     press(page, "#preflight-open")
     sheet(page, "preflight")
-    page.wait_for_selector("#sheet-preflight [data-done]", timeout=SLOW)
+    page.wait_for_selector("#sheet-preflight [data-done]")
     yield "preflight"
     close(page)
     press(page, "#btn-reset-scene")
@@ -108,14 +107,14 @@ def _sheets(page: Page) -> Iterator[str]:
 def _first_minutes(page: Page) -> Iterator[str]:
     for pressed, step in (("btn-start", "source"), ("first-camera", "whose")):
         press(page, f"#{pressed}")
-        page.wait_for_selector(f"#sheet-first[data-step={step}]", timeout=SLOW)
+        page.wait_for_selector(f"#sheet-first[data-step={step}]")
         yield f"first-{step}"
     page.fill("#whose-name", "Anna")
     page.keyboard.press("Enter")
     for pressed, step in (("", "check"), ("first-go", "teach")):
         if pressed:
             press(page, f"#{pressed}")
-        page.wait_for_selector(f"#sheet-first[data-step={step}]", timeout=SLOW)
+        page.wait_for_selector(f"#sheet-first[data-step={step}]")
         page.evaluate("person.follows = false; person.show(null)")
         yield f"first-{step}"
     close(page)
@@ -126,9 +125,9 @@ def _first_minutes(page: Page) -> Iterator[str]:
     # Those who have taught nothing are led on by a drawn hand.
     press(page, "#source-stop")
     press(page, "#btn-start")
-    page.wait_for_selector("#sheet-first[data-step=source]", timeout=SLOW)
+    page.wait_for_selector("#sheet-first[data-step=source]")
     press(page, "#first-synthetic")
-    page.wait_for_selector("#sheet-first[data-step=drive]", timeout=SLOW)
+    page.wait_for_selector("#sheet-first[data-step=drive]")
     yield "first-drive"
     close(page)
 
@@ -138,7 +137,7 @@ def _driving(page: Page, wire: Wire) -> Iterator[str]:
     press(page, "#choose-camera")
     press(page, "#glass-toggle")
     page.evaluate("person.show('forward')")
-    page.wait_for_selector("#glass-body [data-stage=projection][data-reached=yes]", timeout=SLOW)
+    page.wait_for_selector("#glass-body [data-stage=projection][data-reached=yes]")
     wire.robot = {"controller": "operator-9"}
     wait_for(page, "window.farhand.robot.controller === 'operator-9'")
     press(page, "#btn-control")
@@ -157,7 +156,7 @@ def _driving(page: Page, wire: Wire) -> Iterator[str]:
     yield "driving"
     press(page, "#source-stop")
     press(page, "#choose-keys")
-    page.wait_for_selector("#jog [data-move=forward]", timeout=SLOW)
+    page.wait_for_selector("#jog [data-move=forward]")
     yield "keys"
     press(page, "#stop")
     wait_for(page, "window.farhand.robot.mode === 'stopped'")
@@ -170,13 +169,13 @@ def _troubles(page: Page, wire: Wire) -> Iterator[str]:
     page.evaluate(NO_CAMERA)
     press(page, "#source-stop")
     press(page, "#choose-camera")
-    page.wait_for_selector("#source-retry", timeout=SLOW)
+    page.wait_for_selector("#source-retry")
     yield "no-camera"
     wire.robot = {"fault": "robot node crashed (exit code 1)", "mode": "faulted"}
-    page.wait_for_selector(".mode-faulted", timeout=SLOW)
+    page.wait_for_selector(".mode-faulted")
     yield "fault"
     wire.close()
-    page.wait_for_selector("#gone-retry", timeout=SLOW)
+    page.wait_for_selector("#gone-retry")
     yield "gone"
     page.context.clear_cookies()
     wait_for(page, "window.farhand.state.connection.state === 'signed-out'")

@@ -31,6 +31,16 @@ class Link:
         while self.now < until:
             self.show(queue_s)
 
+    def burst(self, queue_s: float) -> None:
+        """Four that are under way together."""
+        start, sequences = self.now, range(self.sequence + 1, self.sequence + 5)
+        for sequence in sequences:
+            self.pace.sent(sequence, start)
+        for sequence in sequences:
+            self.now = start + WAY_S + queue_s + sequence / 1e5
+            self.pace.acknowledge(sequence, self.now)
+        self.sequence += 4
+
 
 def test_levels_ask_less_and_less_of_the_link() -> None:
     load = [each.rate_hz * each.scale**2 * (each.quality or 100) for each in LEVELS]
@@ -56,14 +66,30 @@ def test_one_late_acknowledgement_changes_nothing_and_a_queue_lowers_the_level()
     assert link.pace.level == len(LEVELS) - 1
 
 
-def test_pictures_sent_before_a_change_do_not_judge_the_new_level() -> None:
+def test_pictures_under_way_together_are_held_up_by_one_thing() -> None:
     link = Link()
     link.show(times=5)
-    start, end = link.now, link.now + WAY_S + 0.3
-    for sequence in (101, 102, 103, 104):
-        link.pace.sent(sequence, start)
-    for sequence in (101, 102, 103, 104):
-        link.pace.acknowledge(sequence, end + sequence / 1000)
+    link.burst(0.3)
+    assert link.pace.level == 0
+    link.show()
+    link.burst(0.3)
+    link.burst(0.3)
+    # Those sent before the change do not judge the new level.
+    assert link.pace.level == 1
+
+
+def test_one_that_is_held_up_now_and_then_is_no_reason_to_stay_low() -> None:
+    link = Link()
+    link.show(times=5)
+    link.show(queue_s=0.2, times=2)
+    for _ in range(2):
+        link.show(times=19)
+        link.show(queue_s=0.2)
+    assert link.pace.level == 0
+    link.show(queue_s=0.2, times=2)
+    for _ in range(20):
+        link.show(times=3)
+        link.show(queue_s=0.06)
     assert link.pace.level == 1
 
 

@@ -15,8 +15,6 @@ from tests.gateway.running import Operator, Running, running, settings_for, wait
 
 Hand = Callable[..., bytes]
 
-pytestmark = pytest.mark.timeout(180)
-
 
 @pytest.fixture(scope="module")
 def real(tmp_path_factory: pytest.TempPathFactory, small_database: Path) -> Iterator[Running]:

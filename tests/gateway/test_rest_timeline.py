@@ -30,7 +30,6 @@ from tests.gateway.test_rest_galleries import make
 from tests.gateway.test_rest_gestures import JOG, enrol, error
 
 Hand = Callable[..., bytes]
-pytestmark = pytest.mark.timeout(300)
 SLOW_S = 60.0
 """No test here is about speed."""
 

@@ -53,8 +53,6 @@ except FarhandError as error:
 ROOT = Path(__file__).parents[2]
 HTML = {"Accept": "text/html"}
 
-pytestmark = pytest.mark.timeout(180)
-
 
 @contextmanager
 def program(

@@ -29,8 +29,6 @@ from tests.gateway.running import (
 
 PROTOCOL = f"viser-v{viser.__version__}"
 
-pytestmark = pytest.mark.timeout(120)
-
 
 @pytest.fixture
 def with_viser(node: StandIn, folder: Path) -> Iterator[Running]:

@@ -28,8 +28,6 @@ from app.link.messages import DryRunPath, DryRunProblem, DryRunReport
 from app.robot.models import model_assets
 from app.robot.models.meshes import drawn_urdf
 
-pytestmark = pytest.mark.timeout(120)
-
 
 @pytest.fixture(scope="module")
 def scene() -> Iterator[viser.ViserServer]:

@@ -33,7 +33,7 @@ def gateway(node: NodeEnd, endpoint: str) -> Iterator[GatewayEnd]:
     end.close()
 
 
-def wait_for(condition: Callable[[], object], what: str, timeout: float = 20.0) -> None:
+def wait_for(condition: Callable[[], object], what: str, timeout: float = 120.0) -> None:
     """Return as soon as ``condition`` holds."""
     deadline = time.monotonic() + timeout
     while not condition():

@@ -1,6 +1,5 @@
 """The rules of lease and stops hold whatever happens in whatever order."""
 
-import pytest
 from hypothesis import HealthCheck, settings
 
 from tests.robot.any_order import AnyOrder
@@ -11,4 +10,4 @@ AnyOrder.TestCase.settings = settings(
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow],
 )
-TestAnyOrder = pytest.mark.timeout(300)(AnyOrder.TestCase)
+TestAnyOrder = AnyOrder.TestCase

@@ -76,7 +76,6 @@ def real() -> Iterator[Real]:
     operator.arm.close()
 
 
-@pytest.mark.timeout(300)
 def test_a_cube_is_picked_from_the_table_and_set_down_again(real: Real) -> None:
     real.ready()
     # Over the cube: down it goes at (0.55, 0.10), tool 20 mm above the table.
@@ -104,7 +103,6 @@ def test_a_cube_is_picked_from_the_table_and_set_down_again(real: Real) -> None:
     assert (real.state.mode, real.state.fault) == ("armed", None)
 
 
-@pytest.mark.timeout(300)
 def test_something_that_nobody_knew_of_is_hit_once_and_latched(real: Real) -> None:
     real.ready()
     client = real.arm.client
@@ -131,7 +129,6 @@ def test_something_that_nobody_knew_of_is_hit_once_and_latched(real: Real) -> No
     assert real.state.joints[0] < state.joints[0] - 0.1
 
 
-@pytest.mark.timeout(300)
 def test_fingers_pressed_on_the_table_are_a_collision() -> None:
     """With the stop distances off: what is left is what the arm feels."""
     off = ClearanceSettings(stop=0.0, stop_hand=0.0, stop_itself=0.0, stop_held=0.0)

@@ -18,8 +18,6 @@ from app.link.messages import DryRunReport, DryRunRequest, key
 from app.link.session import open_session, socket_endpoint
 from tests.robot.test_node import ROOT, Remote, wait_for
 
-pytestmark = pytest.mark.timeout(180)
-
 HOME = Pose(name="home")
 MINUTE = Sequence(
     steps=(

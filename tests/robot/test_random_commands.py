@@ -5,7 +5,6 @@ import pytest
 from benchmarks.random_commands import Fuzz
 
 
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize("seed", [11, 12])
 def test_random_commands_break_no_limit(seed: int) -> None:
     fuzz = Fuzz(seed)

@@ -14,8 +14,8 @@ export class ApiError extends Error {
  * Ask the server; gives the answer's JSON. Where gestures were changed it has `change`, the id to
  * take that back by. Throws ApiError.
  */
-export async function request(method, path, { body, json, timeoutMs = 15000 } = {}) {
-    const init = { method, credentials: "same-origin", cache: "no-store" };
+export async function request(method, path, { body, json, timeoutMs = 15000, keepalive = false } = {}) {
+    const init = { method, credentials: "same-origin", cache: "no-store", keepalive };
     if (json !== undefined) {
         init.headers = { "Content-Type": "application/json" };
         init.body = JSON.stringify(json);
@@ -80,7 +80,8 @@ export const api = Object.freeze({
     /** What the owner of a gallery has chosen: {speed, fine, large, glass, language, source}. */
     settings: (gallery) => request("GET", `api/galleries/${id(gallery)}/settings`),
     changeSettings: (gallery, changes) =>
-        request("PATCH", `api/galleries/${id(gallery)}/settings`, { json: changes }),
+        // Also told when the page is being left.
+        request("PATCH", `api/galleries/${id(gallery)}/settings`, { json: changes, keepalive: true }),
     /** A page of what happened, newest first: {events, before, lost}. */
     timeline: ({ kinds = [], before = null } = {}) => {
         const wanted = kinds.map((kind) => ["kind", kind]);

@@ -22,7 +22,7 @@ export class FrameSender {
     #seq = 0;
     #pace = new SendPace();
     #inFlight = new Map(); // seq -> {capturedMs, sentAt, width, height}
-    #sentAt = -Infinity;
+    #begunAt = -Infinity; // the frame before; what encoding takes is part of the interval
     #encoding = false;
     #fresh = null; // capture time of a picture that has not been sent
 
@@ -121,12 +121,13 @@ export class FrameSender {
         }
         const { quality, halved, intervalMs } = this.#pace.wanted;
         // Half a frame of grace: the webcam's beat and ours do not agree.
-        if (now - this.#sentAt < intervalMs - FALLBACK_INTERVAL_MS / 2) return;
+        if (now - this.#begunAt < intervalMs - FALLBACK_INTERVAL_MS / 2) return;
         if (this.#inFlight.size >= IN_FLIGHT || this.#link.waitingBytes > BACKLOG_BYTES) return;
         const capturedMs = this.#fresh;
         const run = this.#running;
         this.#fresh = null;
         this.#encoding = true;
+        this.#begunAt = now;
         try {
             const picture = await this.#encoder.encode(this.#video, quality, halved);
             if (!picture || run !== this.#running) return;
@@ -134,9 +135,9 @@ export class FrameSender {
             if (!this.#link.sendFrame(seq, capturedMs, picture.jpeg)) return;
             this.#seq = seq;
             const { width, height } = picture;
-            this.#sentAt = performance.now();
-            this.#inFlight.set(seq, { capturedMs, sentAt: this.#sentAt, width, height });
-            this.sentTimes.push(this.#sentAt);
+            const sentAt = performance.now();
+            this.#inFlight.set(seq, { capturedMs, sentAt, width, height });
+            this.sentTimes.push(sentAt);
             this.counts.sent += 1;
         } catch (error) {
             // A video that was just taken away gives no picture; anything else is worth knowing.

@@ -4,13 +4,14 @@ const LATE_MS = 100; // an answer that comes this much later than the quickest o
 const QUICK_MS = 50;
 const LATE_IN_A_ROW = 2;
 const STEADY_MS = 3000; // so long answers must be quick before more is tried
+const MOSTLY = 0.9; // part of them: a busy computer holds one up now and then, at any level
 const LONGEST_STEADY_MS = 60000;
 const WINDOW_MS = 30000; // the quickest answer is that of this window and the one before it
 
 /**
  * What to send, the best first: quality goes down first, then size, then rate. `halved` frames have
- * the size at which the server works anyway. At fewer than ten a second a gesture would be seen too
- * late, and a command lives 250 ms.
+ * the size at which the server works anyway. At fewer than fifteen a second a gesture would be seen
+ * late, and with one frame held up the command before it, which lives 250 ms, would end.
  */
 export const LEVELS = Object.freeze([
     { quality: 0.8, halved: false, intervalMs: 0 },
@@ -18,14 +19,14 @@ export const LEVELS = Object.freeze([
     { quality: 0.7, halved: true, intervalMs: 0 },
     { quality: 0.5, halved: true, intervalMs: 0 },
     { quality: 0.5, halved: true, intervalMs: 66 },
-    { quality: 0.5, halved: true, intervalMs: 100 },
 ]);
 
 /**
  * Told of every frame that was sent and answered, it says which of LEVELS is in force. Goes down as
  * soon as two answers in a row were late against the quickest of the last minute (a long way is no
- * queue), and up a step when all were quick for three seconds; a step that proves too much is tried
- * again after twice as long. The server paces its pictures alike (app/gateway/picture_pace.py).
+ * queue), and up a step when nearly all were quick for three seconds; a step that proves too much is
+ * tried again after twice as long. What was under way at the first late answer was held up by the
+ * same, and is not the second: a queue is still there for what is sent afterwards. The server paces its pictures alike (app/gateway/picture_pace.py).
  * Times are in ms on performance.now().
  */
 export class SendPace {
@@ -34,7 +35,10 @@ export class SendPace {
     #windowFrom = -Infinity;
     #quickest = [Infinity, Infinity]; // of this window and the one before
     #late = 0;
-    #quickSince = null;
+    #lateFrom = -Infinity; // frames sent before this were held up by what was counted
+    #answers = 0; // since the last step or look
+    #quick = 0;
+    #since = null;
     #steady = STEADY_MS;
     #raisedAt = -Infinity;
 
@@ -56,21 +60,38 @@ export class SendPace {
         this.#quickest[0] = Math.min(this.#quickest[0], took);
         if (sentAt < this.#judgedFrom) return;
         const waited = took - Math.min(...this.#quickest);
-        this.#late = waited > LATE_MS ? this.#late + 1 : 0;
-        if (waited > QUICK_MS) this.#quickSince = null;
-        else this.#quickSince ??= now;
-        if (this.#late >= LATE_IN_A_ROW) this.#lower(now);
-        else if (this.#quickSince !== null && now - this.#quickSince >= this.#steady) {
-            this.#raise(now);
+        this.#since ??= now;
+        this.#answers += 1;
+        if (waited <= QUICK_MS) this.#quick += 1;
+        if (waited <= LATE_MS) {
+            this.#late = 0;
+        } else if (sentAt >= this.#lateFrom) {
+            this.#late += 1;
+            this.#lateFrom = now;
         }
+        if (this.#late >= LATE_IN_A_ROW) this.#lower(now);
+        else if (now - this.#since >= this.#steady) this.#look(now);
     }
 
     /** Another connection, perhaps another way: what was quickest is not known any more. */
     forget() {
         this.#windowFrom = -Infinity;
         this.#quickest = [Infinity, Infinity];
+        this.#begin();
+    }
+
+    #begin() {
         this.#late = 0;
-        this.#quickSince = null;
+        this.#lateFrom = -Infinity;
+        this.#answers = 0;
+        this.#quick = 0;
+        this.#since = null;
+    }
+
+    /** Steady for long enough: were they quick? */
+    #look(now) {
+        if (this.#quick >= MOSTLY * this.#answers) this.#raise(now);
+        else this.#begin();
     }
 
     #lower(now) {
@@ -83,7 +104,7 @@ export class SendPace {
 
     #raise(now) {
         if (now - this.#raisedAt > LONGEST_STEADY_MS) this.#steady = STEADY_MS;
-        if (this.#level === 0) return;
+        if (this.#level === 0) return this.#begin();
         this.#raisedAt = now;
         this.#go(this.#level - 1, now);
     }
@@ -91,7 +112,6 @@ export class SendPace {
     #go(level, now) {
         this.#level = level;
         this.#judgedFrom = now;
-        this.#late = 0;
-        this.#quickSince = null;
+        this.#begin();
     }
 }

@@ -37,6 +37,7 @@ export class SettingsKeeper extends EventTarget {
         this.#store = store;
         this.#memory = memory;
         store.watch(["gallery", "hello", "connection"], () => this.#look());
+        window.addEventListener("pagehide", () => this.#save());
     }
 
     get(name) {

@@ -1,14 +1,18 @@
 // The state of the page: one flat object, changed only through set().
 
+const EVERY_MS = 50;
+
 /**
- * Listeners are told at most once a drawn picture, however many messages came in between: thirty
- * frames a second from the server must not become thirty layouts a second on a slow laptop.
+ * Listeners are told with a drawn picture, and twenty times a second at most, however many messages
+ * came in between: thirty answers and twenty states of the robot a second must not become fifty
+ * layouts a second on a slow laptop. What comes after a pause is told with the next picture.
  */
 export class Store {
     #state;
     #listeners = [];
     #dirty = new Set();
     #scheduled = false;
+    #toldAt = -Infinity;
 
     constructor(initial) {
         this.#state = { ...initial };
@@ -45,9 +49,12 @@ export class Store {
         const run = () => {
             if (!this.#scheduled) return;
             this.#scheduled = false;
+            this.#toldAt = performance.now();
             this.#flush();
         };
-        requestAnimationFrame(run);
+        const wait = this.#toldAt + EVERY_MS - performance.now();
+        if (wait > 0) setTimeout(() => requestAnimationFrame(run), wait);
+        else requestAnimationFrame(run);
         // Nothing is drawn while the page is hidden, but its state goes on.
         setTimeout(run, 250);
     }

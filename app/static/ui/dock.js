@@ -1,7 +1,7 @@
 // The controls that are always in reach: steps, take control, arm, reset, STOP.
 
 import { texts } from "../texts/texts.js";
-import { button, el, icon, part, setLabel, setText, want } from "./dom.js";
+import { button, el, icon, part, setHidden, setLabel, setText, want } from "./dom.js";
 import { isDriving, modeOf } from "./page.js";
 
 /** Which of the three steps to driving are done, and which is next. */
@@ -57,10 +57,10 @@ export function dockButtons(element, store) {
         const stopped = mode === "stopped";
         const { next } = progress(state);
 
-        start.hidden = next !== "source" || stopped;
+        setHidden(start, next !== "source" || stopped);
         start.disabled = state.source.state === "starting";
-        reset.hidden = !stopped;
-        arm.hidden = stopped;
+        setHidden(reset, !stopped);
+        setHidden(arm, stopped);
         control.disabled = !connected;
         arm.disabled = !driving || !["disarmed", "armed", "moving", "holding"].includes(mode);
         setLabel(

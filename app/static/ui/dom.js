@@ -49,7 +49,32 @@ export function button(label, { iconName = null, ...properties } = {}) {
 
 /** Change text only when it differs: readers and layout are left alone otherwise. */
 export function setText(element, text) {
-    if (element.textContent !== text) element.textContent = text;
+    if (element.textContent === text) return;
+    const only = element.firstChild;
+    // A text that changes costs less than one that takes another's place.
+    if (only && only === element.lastChild && only.nodeType === Node.TEXT_NODE) only.data = text;
+    else element.textContent = text;
+}
+
+/** `hidden` that is set again, though it was, has the styles calculated anew. */
+export function setHidden(element, hidden) {
+    if (element.hidden !== hidden) element.hidden = hidden;
+}
+
+let colours = new Map();
+for (const scheme of ["(prefers-color-scheme: dark)", "(prefers-contrast: more)"]) {
+    window.matchMedia(scheme).addEventListener("change", () => {
+        colours = new Map();
+    });
+}
+
+/** A colour of constants.css, for a canvas. To ask the browser each time would have it lay out. */
+export function colour(name) {
+    if (!colours.has(name)) {
+        const style = getComputedStyle(document.documentElement);
+        colours.set(name, style.getPropertyValue(name).trim());
+    }
+    return colours.get(name);
 }
 
 export function setLabel(buttonElement, label) {
@@ -81,13 +106,19 @@ export function want(element, what, detail = {}) {
     );
 }
 
-/** Whether keys belong to this element: somebody types in it or chooses with it. */
-export function isField(element) {
-    // Not `instanceof`: the 3D view's frame has an Element class of its own.
-    // A slider takes no letters and no Space: both go on meaning what they mean elsewhere.
-    const fields = "input:not([type=range]), textarea, select, [contenteditable]";
-    return Boolean(element && element.closest && element.closest(fields));
-}
+// Not `instanceof`: the 3D view's frame has an Element class of its own.
+const within = (element, selector) =>
+    Boolean(element && element.closest && element.closest(selector));
+
+/**
+ * Whether somebody types in this element. A slider takes no letters and no Space: both go on meaning
+ * what they mean elsewhere.
+ */
+export const isTyped = (element) =>
+    within(element, "input:not([type=range]), textarea, [contenteditable]");
+
+/** Whether letters and arrows belong to this element: somebody types in it or chooses with it. */
+export const isField = (element) => isTyped(element) || within(element, "select");
 
 /** A picture in base64 as an ImageBitmap; null when it is none. */
 export async function bitmapFromBase64(text, type = "image/png") {

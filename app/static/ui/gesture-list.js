@@ -1,7 +1,7 @@
 // The enrolled gestures, what each does, and how close the hand is to each right now.
 
 import { texts } from "../texts/texts.js";
-import { button, el, icon, part, setText, want } from "./dom.js";
+import { button, el, icon, part, setHidden, setText, want } from "./dom.js";
 import { describeAction, number } from "./words.js";
 
 const words = texts.gestures;
@@ -96,7 +96,7 @@ export function gestureList(element, store, { templateUrl }) {
             const known = Number.isFinite(value);
             const share = known ? Math.min(1, Math.max(0, 1 - value / scale.end)) : 0;
             fill.style.transform = `scaleX(${share.toFixed(3)})`;
-            mark.hidden = scale.mark === null || !fresh;
+            setHidden(mark, scale.mark === null || !fresh);
             setText(distance, known ? number(value, 2) : words.noDistance);
             item.classList.toggle("is-near", known && scale.mark !== null && share >= scale.mark);
             item.classList.toggle("is-match", name === matchName || name === held);

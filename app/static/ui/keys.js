@@ -1,6 +1,6 @@
 // Keys that work from anywhere on the page, and from inside the 3D view's frame.
 
-import { isField, want } from "./dom.js";
+import { isField, isTyped, want } from "./dom.js";
 
 const LETTERS = { a: "toggle-arm", c: "toggle-control", f: "toggle-fine", w: "swap", "?": "help" };
 
@@ -9,7 +9,8 @@ const takesArrows = (element) => Boolean(element && element.closest && element.c
 
 /**
  * Space and Escape stop, whatever has the focus, unless somebody types in a field (Escape then
- * leaves the field). `jog` is asked about every other key. `closeSheet` closes what lies over the page and says whether there was
+ * leaves the field). A list to choose from has them for itself only while nothing can move. `jog` is
+ * asked about every other key. `closeSheet` closes what lies over the page and says whether there was
  * something; where nothing can move, Escape does only that.
  */
 export function keys(root, { closeSheet, canMove, jog }) {
@@ -18,15 +19,16 @@ export function keys(root, { closeSheet, canMove, jog }) {
     function down(event, stopOnly = false) {
         if (event.ctrlKey || event.metaKey || event.altKey || event.isComposing) return;
         const typing = isField(event.target);
+        const theirs = isTyped(event.target) || (typing && !canMove());
         if (event.key === "Escape") {
-            if (typing) {
+            if (theirs) {
                 event.target.blur();
             } else if (!event.repeat) {
                 const closed = closeSheet();
                 if (!closed || canMove()) want(root, "stop");
             }
             event.preventDefault();
-        } else if (event.key === " " && !typing) {
+        } else if (event.key === " " && !theirs) {
             event.preventDefault(); // neither scrolls nor presses what has the focus
             swallowed = true;
             if (!event.repeat) want(root, "stop");

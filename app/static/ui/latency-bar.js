@@ -1,7 +1,7 @@
 // The bar that shows where the time of one frame goes, and how old the robot's picture is.
 
 import { texts } from "../texts/texts.js";
-import { el, setText } from "./dom.js";
+import { el, setHidden, setText } from "./dom.js";
 
 const words = texts.latency;
 const EVERY_MS = 250;
@@ -66,7 +66,7 @@ export function latencyBar(element, read) {
         const { parts, total: all, whole, pictureAge } = read();
         for (const { name, ms } of parts) {
             const segment = segments.get(name);
-            segment.hidden = ms === null;
+            setHidden(segment, ms === null);
             segment.style.flexGrow = String(ms || 0);
             segment.classList.toggle("is-short", ms === null || all === null || ms < all * 0.09);
             const text = ms === null ? words.unknown : words.ms(ms);

@@ -1,7 +1,7 @@
 // The operator's own picture with the hand that was found, and where it comes from.
 
 import { texts } from "../texts/texts.js";
-import { bitmapFromBase64, button, el, icon, part, setText, want } from "./dom.js";
+import { bitmapFromBase64, button, colour, el, icon, part, setHidden, setText, want } from "./dom.js";
 
 const words = texts.operator;
 const STALE_MS = 600;
@@ -181,12 +181,9 @@ export function operatorView(element, store) {
             cameras.dataset.key = key;
             cameras.replaceChildren(...options);
         }
-        cameras.hidden = state.source.kind !== "camera" || usable.length < 2;
+        setHidden(cameras, state.source.kind !== "camera" || usable.length < 2);
         if (state.source.deviceId) cameras.value = state.source.deviceId;
     });
-
-    const style = getComputedStyle(document.documentElement);
-    const colour = (name) => style.getPropertyValue(name).trim();
 
     function drawFrame(state) {
         const { frame } = state;
@@ -222,9 +219,9 @@ export function operatorView(element, store) {
         if (performance.now() - state.frameAt >= STALE_MS) drawFrame(state);
         const clip = state.source.kind === "synthetic" && running;
         const shown = state.clipGesture;
-        caption.hidden = !clip || shown === undefined;
+        setHidden(caption, !clip || shown === undefined);
         setText(caption, shown ? words.shows(shown) : words.showsNothing);
-        badge.hidden = !clip;
+        setHidden(badge, !clip);
     }
     setInterval(drawCaption, 200);
     store.watch(["source", "clipGesture"], drawCaption);

@@ -1,7 +1,7 @@
 // Who asks to drive, and the choice between asking and taking over.
 
 import { texts } from "../texts/texts.js";
-import { button, el, setText, want } from "./dom.js";
+import { button, el, setHidden, setText, want } from "./dom.js";
 import { isDriving } from "./page.js";
 
 /** Shows the one who drives that somebody asks for control: hand it over, or drive on. */
@@ -25,7 +25,7 @@ export function askingNotice(host, store) {
     host.append(notice);
     store.watch(["people", "robot", "hello", "connection"], (state) => {
         const asking = state.people ? state.people.asking : [];
-        notice.hidden = !isDriving(state) || !asking.length;
+        setHidden(notice, !isDriving(state) || !asking.length);
         if (notice.hidden) return;
         first = asking[0];
         setText(words, texts.people.asks(first, asking.length - 1));

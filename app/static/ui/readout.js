@@ -1,7 +1,7 @@
 // The arm in figures: joints with their limits, gripper, tool, what is being done.
 
 import { texts, told } from "../texts/texts.js";
-import { button, el, part, setText, want } from "./dom.js";
+import { button, el, part, setHidden, setText, want } from "./dom.js";
 import { angle, degrees, describeAction, jointName, number, short, toldOf } from "./words.js";
 
 const words = texts.readout;
@@ -67,7 +67,7 @@ export function readout(element, store) {
             const upper = limit ? limit.upper : Math.PI;
             const share = (values[index] - lower) / (upper - lower);
             needle.style.insetInlineStart = `${(Math.min(1, Math.max(0, share)) * 100).toFixed(1)}%`;
-            needle.parentElement.hidden = drives;
+            setHidden(needle.parentElement, drives);
             setText(value, slides ? words.slideValue(number(values[index] * 100)) : angle(values[index]));
             setText(low, limit ? end(lower) : "");
             setText(high, limit ? end(upper) : "");
@@ -77,26 +77,26 @@ export function readout(element, store) {
         setText(doing, robot && robot.action ? describeAction(robot.action, description) : words.nothing);
         const width = robot && robot.gripper;
         setText(gripper, Number.isFinite(width) ? words.gripperOpen(number(width * 1000, 0)) : "–");
-        gripper.parentElement.hidden = Boolean(description) && description.gripper_max === 0;
+        setHidden(gripper.parentElement, Boolean(description) && description.gripper_max === 0);
         const base = robot && robot.base;
-        place.parentElement.hidden = !Array.isArray(base);
+        setHidden(place.parentElement, !Array.isArray(base));
         if (Array.isArray(base)) {
             const [x, y, heading] = base;
             setText(place, words.placeValue(short(x * 100, 0), short(y * 100, 0), short(degrees(heading), 0)));
         }
         const position = robot && !base && robot.tool && robot.tool.position;
-        tool.parentElement.hidden = !Array.isArray(position);
+        setHidden(tool.parentElement, !Array.isArray(position));
         if (Array.isArray(position)) {
             setText(tool, words.toolValue(...position.map((metres) => short(metres * 100, 0))));
         }
         const near = robot && robot.clearance;
-        nearest.parentElement.hidden = !near;
+        setHidden(nearest.parentElement, !near);
         if (near) {
             const thing = near.itself ? words.itself(told(near.thing)) : told(near.thing);
             setText(nearest, words.nearestValue(number(near.distance * 1000, 0), thing, told(near.link)));
         }
         const limited = (robot && robot.limits) || [];
-        active.parentElement.hidden = !limited.length;
+        setHidden(active.parentElement, !limited.length);
         setText(active, limited.map((limit) => toldOf(limit, description)).join(", "));
         putBack.disabled = !robot || !robot.online || robot.armed || robot.mode === "faulted";
     }

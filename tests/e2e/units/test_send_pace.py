@@ -33,9 +33,15 @@ def test_fewer_and_smaller_frames_go_up_while_answers_are_late(modules: Page) ->
     assert play("show(0, 200); see();") == [0], "a long way is no queue"
     assert play("show(0, 9); show(500); show(0); see(); show(200, 2); see();") == [0, 1]
     assert play("show(0, 9); show(200, 100); see();") == [last]
-    # Frames that were on their way before the change do not judge the new level.
-    burst = "for (const n of [1, 2, 3, 4]) pace.answered(now, now + 400 + n);"
-    assert play(f"show(0, 9); {burst} see();") == [1]
+    # Frames that were on their way together were held up by one thing; that there is a queue is
+    # seen by those after them. What was on its way before a change does not judge the new level.
+    burst = "{ for (const n of [1, 2, 3, 4]) pace.answered(now, now + 400 + n); now += 405; }"
+    assert play(f"show(0, 9); {burst} see(); show(0); {burst} see(); {burst} see();") == [0, 0, 1]
+    # One that is held up now and then is no reason to stay low.
+    hiccup = "show(0, 19); show(200);"
+    assert play(f"show(0, 9); show(200, 2); see(); {hiccup * 2} see();") == [1, 0]
+    often = "show(0, 3); show(60);"
+    assert play(f"show(0, 9); show(200, 2); {often * 20} see();") == [1]
     # Up again, a step after three quick seconds; and back where the queue comes from.
     up = "show(0, 9); show(200, 4); see(); showFor(2500); see(); showFor(1000); see();"
     assert play(f"{up} showFor(3500); see();") == [2, 2, 1, 0]

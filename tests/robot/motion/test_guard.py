@@ -302,7 +302,6 @@ def test_a_search_that_takes_too_long_is_given_up(proximity: SimulatedProximity)
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.timeout(600)
 def test_no_distance_is_ever_broken_whatever_is_asked(
     proximity: SimulatedProximity, seed: int
 ) -> None:

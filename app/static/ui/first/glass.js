@@ -1,7 +1,7 @@
 // The webcam's picture as in a mirror, with the hand that was found and a ring that fills.
 
 import { texts } from "../../texts/texts.js";
-import { el } from "../dom.js";
+import { colour, el } from "../dom.js";
 
 const WIDTH = 480;
 
@@ -20,13 +20,7 @@ export class Glass {
             this.#canvas,
             corner,
         );
-        const style = getComputedStyle(document.documentElement);
-        this.#found = style.getPropertyValue("--overlay-found").trim();
-        this.#match = style.getPropertyValue("--overlay-match").trim();
     }
-
-    #found;
-    #match;
 
     /** Draw the picture of now; `box` in shares of it or null, `share` of the ring that is full. */
     draw(box, share = 0) {
@@ -50,7 +44,7 @@ export class Glass {
             context.stroke();
         };
         ring("rgba(5, 8, 10, 0.55)", 10, 1);
-        ring(this.#found, 2, 1);
-        if (share > 0) ring(this.#match, 8, share);
+        ring(colour("--overlay-found"), 2, 1);
+        if (share > 0) ring(colour("--overlay-match"), 8, share);
     }
 }

@@ -1,5 +1,7 @@
 // A canvas that is as sharp as the screen, and drawn in the pixels of the page.
 
+import { colour } from "../dom.js";
+
 /**
  * Make a canvas as fine as the screen and clear it. Returns {context, width, height}, the size in
  * CSS pixels; null while it is not shown.
@@ -23,14 +25,12 @@ export function prepare(canvas) {
 
 /** The colours of drawings, from the constants: {ground, curve, cut, line, text, match}. */
 export function colours() {
-    const style = getComputedStyle(document.documentElement);
-    const named = (name) => style.getPropertyValue(name).trim();
     return {
-        ground: named("--plot-ground"),
-        curve: named("--plot-curve"),
-        cut: named("--plot-cut"),
-        line: named("--plot-line"),
-        text: named("--plot-text"),
-        match: named("--overlay-match"),
+        ground: colour("--plot-ground"),
+        curve: colour("--plot-curve"),
+        cut: colour("--plot-cut"),
+        line: colour("--plot-line"),
+        text: colour("--plot-text"),
+        match: colour("--overlay-match"),
     };
 }
