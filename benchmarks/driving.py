@@ -3,7 +3,6 @@
 import contextlib
 import shutil
 import signal
-import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,7 +11,7 @@ import psutil
 from playwright.sync_api import Page, sync_playwright
 
 from app.gestures.synthetic import Step, SyntheticOperator, write_mjpeg
-from tests.e2e.running import BASE_ARGUMENTS, Server, wait_for
+from tests.e2e.running import BASE_ARGUMENTS, Server, take_and_arm, wait_for
 
 
 def webcam(script: Sequence[Step], path: Path) -> Path:
@@ -44,26 +43,10 @@ def browser(server: Server, video: Path, *, view_3d: bool = False) -> Iterator[P
         wait_for(page, "window.farhand?.robot?.mode === 'disarmed'")
         page.click("#choose-camera")
         wait_for(page, "window.farhand.frame !== null")
-        _take_and_arm(page)
+        take_and_arm(page)
         yield page
         if chromium.is_connected():
             chromium.close()
-
-
-def _take_and_arm(page: Page) -> None:
-    """As a person would: press again what brought nothing."""
-    give_up = time.monotonic() + 60
-    mine = "window.farhand.robot.controller === window.farhand.hello.session"
-    while not page.evaluate("window.farhand.robot.armed"):
-        wanted, button = ("window.farhand.robot.armed", "#btn-arm")
-        if not page.evaluate(mine):
-            wanted, button = (mine, "#btn-control")
-        page.click(button)
-        try:
-            wait_for(page, wanted, 5)
-        except TimeoutError:
-            if time.monotonic() > give_up:
-                raise
 
 
 def signal_browser(number: signal.Signals) -> None:

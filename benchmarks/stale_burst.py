@@ -91,7 +91,7 @@ async def frames(rig: Rig, proxy: Proxy, *, one_way: bool, anew: bool) -> Outcom
             and sent.get(command.frame, forwarded) < forwarded - FRAME_AGE_MS
             for arrived, command in observer.commands
         )
-        give_up = time.monotonic() + 20
+        give_up = time.monotonic() + 60
         await operator.play(
             clip(rig.next_gesture()).shown(),
             until=lambda: not observer.stands() or time.monotonic() > give_up,

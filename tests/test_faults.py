@@ -6,7 +6,8 @@ them to the promise itself.
 
 import asyncio
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -15,7 +16,13 @@ import pytest
 from benchmarks import estop, node_faults, stale_burst
 from benchmarks.observer import STANDSTILL_MS, Observer, wait
 from benchmarks.rig import Rig
-from benchmarks.standstill import Outcome, gateway_killed, gateway_stopped, network_blackholed
+from benchmarks.standstill import (
+    NotAtFullSpeed,
+    Outcome,
+    gateway_killed,
+    gateway_stopped,
+    network_blackholed,
+)
 from tests.proxy import Proxy
 
 
@@ -39,13 +46,20 @@ def separate(tmp_path: Path) -> Iterator[Rig]:
         yield rig
 
 
-def stood(outcome: Outcome) -> bool:
+def stood(fault: Callable[[], Outcome]) -> bool:
+    """A busy machine may have to try again before the arm is at full speed."""
+    for _ in range(5):
+        with suppress(NotAtFullSpeed):
+            outcome = fault()
+            break
+    else:
+        raise NotAtFullSpeed
     return outcome.standstill.since_command_ms <= 2 * STANDSTILL_MS and not outcome.moved_again
 
 
 def test_a_network_that_swallows_everything(rig: Rig) -> None:
     with Proxy(urlsplit(rig.url).port or 0) as proxy:
-        assert stood(network_blackholed(rig, proxy))
+        assert stood(lambda: network_blackholed(rig, proxy))
 
 
 @pytest.mark.parametrize(("one_way", "anew"), [(False, True), (True, True), (True, False)])
@@ -65,18 +79,18 @@ def test_commands_that_a_stall_delayed_move_nothing() -> None:
 def test_a_gateway_that_is_stopped_and_goes_on(rig: Rig) -> None:
     with rig.server.api() as api:
         before = api.get("/api/robots").json()[0]["restarts"]
-        assert stood(gateway_stopped(rig))
+        assert stood(lambda: gateway_stopped(rig))
         # Its node was not to blame.
         assert api.get("/api/robots").json()[0]["restarts"] == before
 
 
 def test_a_gateway_that_is_killed_takes_its_node_to_rest_first(rig: Rig) -> None:
-    assert stood(gateway_killed(rig))
+    assert stood(lambda: gateway_killed(rig))
 
 
 def test_a_node_of_its_own_outlives_its_gateway(separate: Rig) -> None:
-    assert stood(gateway_stopped(separate))
-    assert stood(gateway_killed(separate))
+    assert stood(lambda: gateway_stopped(separate))
+    assert stood(lambda: gateway_killed(separate))
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])

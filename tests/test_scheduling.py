@@ -109,6 +109,7 @@ def test_whatever_drives_a_real_node_is_live() -> None:
     signs = (
         "#btn-arm",
         "start_driving(",
+        "take_and_arm(",
         "benchmarks.rig import",
         "class Remote",
         "import ROOT, Remote",

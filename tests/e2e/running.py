@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -148,6 +149,36 @@ def wait_for(page: Page, expression: str, seconds: float = PATIENCE_S) -> None:
             robot = page.evaluate("JSON.stringify(window.farhand?.robot)")
             raise TimeoutError(f"not true within {seconds:g} s: {expression}\nrobot: {robot}")
         page.wait_for_timeout(20)
+
+
+MINE = "window.farhand.robot.controller === window.farhand.hello.session"
+ARMED = "window.farhand.robot.armed"
+
+
+def press_until(page: Page, button: str, expression: str, seconds: float = PATIENCE_S) -> None:
+    """Press a button as a person does: again, where it has brought nothing.
+
+    On a starved machine the robot may be silent for a moment, and then nothing can be asked of it.
+
+    Raises:
+        TimeoutError: the JavaScript expression did not become true.
+    """
+    give_up = time.monotonic() + seconds
+    while not page.evaluate(expression):
+        page.click(button)
+        try:
+            wait_for(page, expression, 5)
+        except TimeoutError:
+            if time.monotonic() > give_up:
+                raise
+
+
+def take_and_arm(page: Page) -> None:
+    """Become who drives, and arm."""
+    while not page.evaluate(ARMED):
+        press_until(page, "#btn-control", MINE)
+        with suppress(TimeoutError):
+            press_until(page, "#btn-arm", f"{ARMED} || !({MINE})", 20)
 
 
 def run(page: Page, module: str, script: str, argument: Any = None) -> Any:

@@ -13,7 +13,7 @@ from playwright.sync_api import Page, expect
 from app.gateway.tokens import TokenStore
 from app.gestures.synthetic import Step, SyntheticOperator, write_mjpeg
 from tests.e2e.conftest import OpenPage
-from tests.e2e.running import TOKEN, Server, put_at_rest, wait_for
+from tests.e2e.running import TOKEN, Server, press_until, put_at_rest, take_and_arm, wait_for
 
 pytestmark = pytest.mark.e2e
 
@@ -40,10 +40,7 @@ def start_driving(page: Page) -> None:
     wait_for(page, "window.farhand?.robot?.mode === 'disarmed'")
     page.click("#choose-camera")
     wait_for(page, "window.farhand.frame !== null")
-    page.click("#btn-control")
-    wait_for(page, "window.farhand.robot.controller === window.farhand.hello.session")
-    page.click("#btn-arm")
-    wait_for(page, "window.farhand.robot.armed")
+    take_and_arm(page)
 
 
 def height(page: Page) -> float:
@@ -123,9 +120,8 @@ def test_stop_latches_until_reset_and_arming(
     now = page.evaluate("window.farhand.robot.joints")
     assert now == pytest.approx(stood, abs=2e-3)
 
-    page.click("#btn-reset")
-    wait_for(page, "window.farhand.robot.mode === 'disarmed'")
-    page.click("#btn-arm")
+    press_until(page, "#btn-reset", "window.farhand.robot.mode === 'disarmed'")
+    take_and_arm(page)
     wait_for(page, "window.farhand.robot.mode === 'moving'")
 
 
@@ -154,6 +150,8 @@ def test_speed_and_fine_reach_the_robot_are_remembered_and_leave_the_stop_key_al
 def test_things_are_put_back_when_asked_twice(server: Server, open_page: OpenPage) -> None:
     page = open_page(server.link)
     wait_for(page, "window.farhand?.robot?.mode === 'disarmed'")
+    # An arm that has just been let down upon its brakes still settles.
+    wait_for(page, "window.farhand.robot.velocities.every((each) => Math.abs(each) < 0.001)")
     page.click("#btn-reset-scene")
     expect(page.locator("#sheet-reset-scene")).to_contain_text("The arm does not move")
     page.click("#sheet-reset-scene [data-part=yes]")
@@ -195,9 +193,7 @@ def test_the_synthetic_operator_drives_without_a_camera(
     wait_for(page, "window.farhand?.robot?.mode === 'disarmed'")
     page.click("#choose-synthetic")
     wait_for(page, "window.farhand.frame !== null")
-    page.click("#btn-control")
-    wait_for(page, "window.farhand.robot.controller !== null")
-    page.click("#btn-arm")
+    take_and_arm(page)
     wait_for(page, "window.farhand.robot.mode === 'moving'")
 
 

@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import OpenPage
-from tests.e2e.running import Server, wait_for
+from tests.e2e.running import Server, take_and_arm, wait_for
 
 pytestmark = pytest.mark.e2e
 
@@ -18,7 +18,7 @@ EVERY_STAGE = (
 DRAWN = """
 () => [...document.querySelectorAll("#glass-body canvas")].map((canvas) => {
     const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
-    return data.some((value, at) => at % 4 !== 3 && value > 60);
+    return canvas.ariaLabel.length > 20 && data.some((value, at) => at % 4 !== 3 && value > 60);
 }).every((isDrawn, at) => isDrawn || at === 1)
 """
 """All but the second, what moved: that is black while nothing does."""
@@ -59,8 +59,6 @@ def test_the_glass_box_shows_every_step_and_the_bar_where_the_time_goes(
     )
     assert stages == STAGES
     wait_for(page, f"{EVERY_STAGE} && ({DRAWN})()")
-    for name in page.locator("#glass-body canvas").all():
-        assert len(name.get_attribute("aria-label") or "") > 20
     loaded = "all => all.filter((picture) => picture.naturalWidth === 60 && picture.alt).length"
     assert page.locator("#glass-body .near-list img").count() == 5
     wait_for(
@@ -82,9 +80,7 @@ def test_the_glass_box_shows_every_step_and_the_bar_where_the_time_goes(
     wait_for(page, "window.farhand.state.detail.glass === undefined")
 
     # From the camera to the motion and back: the parts are named, and add up.
-    page.click("#btn-control")
-    wait_for(page, "window.farhand.robot.controller === window.farhand.hello.session")
-    page.click("#btn-arm")
+    take_and_arm(page)
     wait_for(page, "window.farhand.latency.whole", 120)
     expect(page.locator("#latency-age")).to_have_text(re.compile(r"^picture \d+ ms old$"))
     page.focus("#latency-bar")

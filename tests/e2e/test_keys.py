@@ -6,7 +6,7 @@ from collections.abc import Callable
 from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import OpenPage
-from tests.e2e.running import Server, wait_for
+from tests.e2e.running import ARMED, MINE, Server, press_until, wait_for
 
 Press = Callable[[], object]
 PAD = """
@@ -69,11 +69,10 @@ def test_the_arm_moves_while_a_key_or_a_button_or_a_stick_is_held(
     expect(page.locator("#operator-title")).to_have_text("Keys")
 
     # Nothing is armed by a key that is held.
-    page.click("#btn-control")
-    wait_for(page, "window.farhand.robot.controller === window.farhand.hello.session")
+    press_until(page, "#btn-control", MINE)
+    expect(page.locator("#btn-arm")).to_be_enabled()
     page.keyboard.down("ArrowUp")
-    page.click("#btn-arm")
-    wait_for(page, "window.farhand.robot.armed")
+    press_until(page, "#btn-arm", ARMED)
     expect(page.locator("#sentence")).to_contain_text("let go and press it again")
     assert page.evaluate("window.farhand.robot.mode") != "moving"
     page.keyboard.up("ArrowUp")

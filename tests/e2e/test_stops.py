@@ -8,7 +8,7 @@ from playwright.sync_api import Page, expect
 from app.gateway.tokens import TokenStore
 from tests.e2e.conftest import OpenPage
 from tests.e2e.person import person_script
-from tests.e2e.running import TOKEN, Server, wait_for
+from tests.e2e.running import TOKEN, Server, press_until, take_and_arm, wait_for
 
 pytestmark = pytest.mark.e2e
 
@@ -66,13 +66,12 @@ def test_button_key_and_gesture_stop_alike_for_who_drives_and_who_watches(
     operators, observers = {}, {}
     for way, (stop, why) in ways.items():
         wait_for(drives, "window.farhand.robot.mode === 'disarmed'")
-        drives.click("#btn-arm")
-        wait_for(drives, "window.farhand.robot.armed")
+        take_and_arm(drives)
         stop()
         operators[way] = stopped(drives, why)
         observers[way] = stopped(watches, why)
         drives.evaluate("person.show(null)")
-        drives.click("#btn-reset")
+        press_until(drives, "#btn-reset", "window.farhand.robot.mode === 'disarmed'")
     for faces in (operators, observers):
         assert faces["key"] == faces["button"]
         assert faces["gesture"] == faces["button"]

@@ -25,6 +25,7 @@ const STYLES = "static/styles/first.css";
 export class FirstMinutes {
     #disarmedAt = -Infinity;
     #note = ""; // what came of the teaching
+    #waits = 0; // for the gestures
 
     constructor({ host, store, video, sheets, progress, act, templateUrl, told }) {
         Object.assign(this, { host, store, video, sheets, progress, act, templateUrl, told });
@@ -52,7 +53,13 @@ export class FirstMinutes {
         this.progress.set({ ...this.progress.get(), ...changes });
     }
 
+    /** Each step is about the gestures of who was chosen: none begins before these are here. */
     #next() {
+        clearTimeout(this.#waits);
+        if (this.store.state.gesturesState === "loading") {
+            this.#waits = setTimeout(() => this.#next(), WATCH_MS);
+            return;
+        }
         this.#show(this.#now());
     }
 
@@ -68,6 +75,7 @@ export class FirstMinutes {
             focus,
             onclose: () => {
                 clearInterval(watch);
+                clearTimeout(this.#waits);
                 close();
             },
         });
