@@ -18,7 +18,7 @@ from app.gestures.hand import POSES, HandView, render_hand
 from app.gestures.synthetic import Step
 from benchmarks.driving import browser, webcam
 from tests.e2e.person import person_script
-from tests.e2e.running import Server, start_server, stop_server, wait_for
+from tests.e2e.running import Server, start_server, stop_server, take_and_arm, wait_for
 
 PICTURES = Path(__file__).parent / "pictures"
 QUALITY = 78
@@ -60,9 +60,11 @@ def driving(
     server: Server, video: Path, size: tuple[int, int] = DESK, *, view_3d: bool = False
 ) -> Iterator[Page]:
     """A page that drives, of a size in pixels."""
-    with browser(server, video, view_3d=view_3d) as page:
+    with browser(server, video) as page:
         page.set_default_timeout(PATIENCE_MS)
         page.set_viewport_size({"width": size[0], "height": size[1]})
+        if view_3d:
+            page.click("#show-3d")
         yield page
 
 
@@ -91,6 +93,7 @@ def drive(server: Server, video: Path) -> None:
     """Everything at a glance, while the arm moves."""
     with driving(server, video, view_3d=True) as page:
         view = pause_3d(page)
+        take_and_arm(page)  # loading it may have cost the connection
         wait_for(page, MOVING)
         page.wait_for_timeout(700)
         draw_3d(page, view, 1)
@@ -134,6 +137,7 @@ def view_3d(server: Server, video: Path) -> None:
     with driving(server, video, view_3d=True) as page:
         page.evaluate(LARGE_3D)
         view = pause_3d(page)
+        take_and_arm(page)  # loading it may have cost the connection
         wait_for(page, MOVING)
         page.wait_for_timeout(1800)
         draw_3d(page, view)

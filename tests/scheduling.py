@@ -24,6 +24,7 @@ LIVE = (
     "robot/test_camera.py",
     "robot/test_dry_run.py",
     "robot/test_node.py",
+    "test_doctor.py",
     "test_faults.py",
 )
 """Somebody drives a real node: a command that comes 250 ms late is none, and the arm waits."""

@@ -1,4 +1,4 @@
-"""What ``farhand doctor`` says when a part is missing. That all is well is held by test_cli.py."""
+"""What ``farhand doctor`` says when a part is missing. Times are among what it checks."""
 
 from pathlib import Path
 
@@ -51,3 +51,10 @@ def test_a_network_is_read_once_and_runs_on_one_thread() -> None:
     assert network.load(mask.MODEL) is session
     assert isinstance(session, onnxruntime.InferenceSession)
     assert session.get_session_options().intra_op_num_threads == 1
+
+
+def test_it_finds_nothing_wrong_here(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run_checks(Settings(port=0, data_dir=tmp_path / "data"))
+    found = capsys.readouterr().out
+    assert "FAIL" not in found, found
+    assert "robot node" in found

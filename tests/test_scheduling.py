@@ -109,7 +109,7 @@ def test_whatever_drives_a_real_node_is_live() -> None:
     signs = (
         "#btn-arm",
         "start_driving(",
-        "take_and_arm(",
+        "take_and_arm(page",
         "benchmarks.rig import",
         "class Remote",
         "import ROOT, Remote",

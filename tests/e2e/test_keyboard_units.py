@@ -70,6 +70,27 @@ def test_a_sheet_has_the_keys_to_itself(modules: Page) -> None:
     assert "J2" in chosen
 
 
+def test_the_stop_keys_stop_from_a_list_too_while_anything_can_move(modules: Page) -> None:
+    script = """
+        let moves = true;
+        keys(document.body, { closeSheet: () => false, canMove: () => moves, jog });
+        const list = document.body.appendChild(document.createElement("select"));
+        const typed = document.body.appendChild(document.createElement("input"));
+        const all = [];
+        for (const [field, can] of [[list, true], [list, false], [typed, true]]) {
+            moves = can;
+            field.focus();
+            press(" ");
+            press("a");
+            press("Escape");
+            all.push(wishes.splice(0));
+        }
+        held.stop();
+        return all;
+    """
+    assert cockpit(modules, script) == [["stop", "stop"], [], []]
+
+
 def test_no_letter_means_two_things() -> None:
     def letters(name: str, pattern: str) -> set[str]:
         code = (STATIC / name).read_text()

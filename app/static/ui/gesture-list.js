@@ -73,8 +73,14 @@ export function gestureList(element, store, { templateUrl }) {
             : gestures.length ? words.legend
             : words.empty;
         setText(note, text);
+        // Who stands on a gesture's button stays there: the list is told anew after every change.
+        const stood = list.contains(document.activeElement)
+            ? document.activeElement.closest("[data-id]").dataset.id
+            : null;
         rows = gestures.map((gesture) => row(gesture, state, element, templateUrl));
         list.replaceChildren(...rows.map(({ item }) => item));
+        const there = rows.find(({ item }) => item.dataset.id === stood);
+        if (there) there.item.querySelector("button").focus({ preventScroll: true });
         draw();
     });
 
