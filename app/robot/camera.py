@@ -32,7 +32,7 @@ _log = logging.getLogger(__name__)
 MAX_RATE_HZ = 30.0
 """Pictures a second of each camera, at most."""
 JPEG_QUALITY = 82
-NICENESS = 19
+NICENESS = 10
 """Control, the operator's frames and a browser beside them go first."""
 IDLE_S = 0.05
 """Between two looks for viewers or for a new state."""

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
-NICENESS = 10
+NICENESS = 15
 """The control loop and the operator's frames go first; pictures, which wait for nobody, do not."""
 IDLE_S = 0.5
 
