@@ -31,7 +31,8 @@ STOP_THREADS = 4
 """A stop never waits for a thread that a silent robot keeps busy."""
 
 
-CONFIRM_RESET_S = 0.2
+CONFIRM_RESET_S = 1.0
+"""So long a state is waited for that shows what the robot has agreed to."""
 
 
 def package_version() -> str:
@@ -182,8 +183,10 @@ class Hub:
             RobotUnavailable: no answer came in time.
         """
         check_reply(await self.ask(LeaseRequest(kind="reset", holder=source[:80])))
-        # What is told next should show it already.
-        await asyncio.to_thread(self.robot.wait_newer, CONFIRM_RESET_S)
+        # What is told next should show it already; a state may have been on its way meanwhile.
+        await asyncio.to_thread(
+            self.robot.wait_newer, CONFIRM_RESET_S, lambda state: state.mode != "stopped"
+        )
 
     async def reset_scene(self, source: str) -> None:
         """Put every movable thing back where it was at first.

@@ -10,6 +10,7 @@ import shutil
 import tempfile
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
@@ -171,11 +172,15 @@ class RobotPort:
         """Process id of our node."""
         return None if self._process is None else self._process.pid
 
-    def wait_newer(self, timeout_s: float) -> bool:
-        """Wait for a state that comes after this call; False when none does."""
+    def wait_newer(self, timeout_s: float, so: Callable[[State], bool] = lambda _: True) -> bool:
+        """Wait for a state that comes after this call and is so; False when none does."""
         since = time.monotonic()
+
+        def has_come() -> bool:
+            return self._state is not None and (self._state_at or 0.0) > since and so(self._state)
+
         with self._changed:
-            return self._changed.wait_for(lambda: (self._state_at or 0.0) > since, timeout_s)
+            return self._changed.wait_for(has_come, timeout_s)
 
     # Asking
 

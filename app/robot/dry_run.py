@@ -22,7 +22,7 @@ from app.errors import FarhandError
 from app.link.messages import DryRunReport, DryRunRequest, State, key
 from app.link.reading import decode
 from app.link.session import open_session
-from app.robot.beside import Alive, NewestState, give_way
+from app.robot.beside import Alive, NewestState
 from app.robot.rehearsal import STEP_S, Rehearsal
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
-NICENESS = 15
+NICENESS = 5
 """The control loop and the operator's frames go first; pictures, which wait for nobody, do not."""
 IDLE_S = 0.5
 
@@ -166,9 +166,9 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parent = os.getppid()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
-    # A Ctrl-C in the terminal is the node's business, which ends this process in its own time.
+    # A Ctrl-C in the terminal reaches the whole group; the node ends this process in its own time.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    give_way(NICENESS)
+    os.nice(NICENESS)
     try:
         settings = ArmMotionSettings.model_validate_json(options.motion)
         session = open_session(options.endpoint, listen=False)

@@ -155,7 +155,16 @@ MINE = "window.farhand.robot.controller === window.farhand.hello.session"
 ARMED = "window.farhand.robot.armed"
 
 
-def press_until(page: Page, button: str, expression: str, seconds: float = PATIENCE_S) -> None:
+Click = Callable[[Page, str], object]
+
+
+def press_until(
+    page: Page,
+    button: str,
+    expression: str,
+    seconds: float = PATIENCE_S,
+    click: Click = Page.click,
+) -> None:
     """Press a button as a person does: again, where it has brought nothing.
 
     On a starved machine the robot may be silent for a moment, and then nothing can be asked of it.
@@ -165,7 +174,7 @@ def press_until(page: Page, button: str, expression: str, seconds: float = PATIE
     """
     give_up = time.monotonic() + seconds
     while not page.evaluate(expression):
-        page.click(button)
+        click(page, button)
         try:
             wait_for(page, expression, 5)
         except TimeoutError:
@@ -173,12 +182,12 @@ def press_until(page: Page, button: str, expression: str, seconds: float = PATIE
                 raise
 
 
-def take_and_arm(page: Page) -> None:
+def take_and_arm(page: Page, click: Click = Page.click) -> None:
     """Become who drives, and arm."""
     while not page.evaluate(ARMED):
-        press_until(page, "#btn-control", MINE)
+        press_until(page, "#btn-control", MINE, click=click)
         with suppress(TimeoutError):
-            press_until(page, "#btn-arm", f"{ARMED} || !({MINE})", 20)
+            press_until(page, "#btn-arm", f"{ARMED} || !({MINE})", 20, click)
 
 
 def run(page: Page, module: str, script: str, argument: Any = None) -> Any:

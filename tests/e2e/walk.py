@@ -8,9 +8,7 @@ from typing import Any
 from playwright.sync_api import Page, WebSocketRoute, expect
 
 from tests.e2e.person import person_script
-from tests.e2e.running import Server, wait_for
-
-MINE = "window.farhand.robot.controller === window.farhand.hello.session"
+from tests.e2e.running import Server, press_until, take_and_arm, wait_for
 
 
 @dataclass
@@ -146,10 +144,7 @@ def _driving(page: Page, wire: Wire) -> Iterator[str]:
     close(page)
     wire.robot = {}
     wait_for(page, "!window.farhand.robot.controller")
-    press(page, "#btn-control")
-    wait_for(page, MINE)
-    press(page, "#btn-arm")
-    wait_for(page, "window.farhand.robot.armed")
+    take_and_arm(page, press)
     wire.people = {"asking": ["operator-9"]}
     press(page, "#latency-bar")
     press(page, "#fine")
@@ -161,8 +156,7 @@ def _driving(page: Page, wire: Wire) -> Iterator[str]:
     press(page, "#stop")
     wait_for(page, "window.farhand.robot.mode === 'stopped'")
     yield "stopped"
-    press(page, "#btn-reset")
-    wait_for(page, "window.farhand.robot.mode === 'disarmed'")
+    press_until(page, "#btn-reset", "window.farhand.robot.mode === 'disarmed'", click=press)
 
 
 def _troubles(page: Page, wire: Wire) -> Iterator[str]:
