@@ -4,17 +4,14 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import OpenPage
-from tests.e2e.running import Server, wait_for
+from tests.e2e.running import MINE, Server, press_until, wait_for
 
 pytestmark = pytest.mark.e2e
-
-DRIVES = "window.farhand.robot.controller === window.farhand.hello.session"
 
 
 def take(page: Page) -> None:
     wait_for(page, "window.farhand?.robot?.mode === 'disarmed'")
-    page.click("#btn-control")
-    wait_for(page, DRIVES)
+    press_until(page, "#btn-control", MINE)
 
 
 def test_one_asks_and_the_other_drives_on_and_then_hands_over(
@@ -27,7 +24,7 @@ def test_one_asks_and_the_other_drives_on_and_then_hands_over(
     name = second.evaluate("window.farhand.hello.session")
 
     for answer in ("keep", "hand-over"):
-        second.click("#btn-control")
+        press_until(second, "#btn-control", "document.querySelector('#sheet-take-over')")
         second.click("#sheet-take-over [data-part=ask]")
         asking = first.locator("#asking .notice")
         expect(asking).to_contain_text(f"{name} asks for control.")
@@ -36,11 +33,11 @@ def test_one_asks_and_the_other_drives_on_and_then_hands_over(
         if answer == "keep":
             refusal = second.locator("#notices .notice", has_text="goes on driving")
             expect(refusal).to_be_visible()
-            assert first.evaluate(DRIVES)
+            wait_for(first, MINE)
 
-    wait_for(second, DRIVES)
+    wait_for(second, MINE)
     expect(second.locator("#notices")).to_contain_text("Control is yours.")
-    wait_for(first, "!(" + DRIVES + ")")
+    wait_for(first, "!(" + MINE + ")")
     assert first.evaluate("!window.farhand.robot.armed")
     # It was given away, not lost.
     assert first.locator("#notices .notice", has_text="You no longer drive").count() == 0
