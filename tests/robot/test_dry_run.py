@@ -46,7 +46,11 @@ class Checked:
             cwd=ROOT,
         )  # fmt: skip
         self.remote = Remote(self.endpoint)
-        wait_for(lambda: self.ask(action) is not None, "the first answer", 60)
+        try:
+            wait_for(lambda: self.ask(action) is not None, "the first answer", 120)
+        except AssertionError:
+            self.close()  # its threads would keep the tests from ending
+            raise
 
     def ask(self, action: Action, start: str = "current") -> DryRunReport | None:
         """Once nothing else is being checked, and a child that was just started knows where the arm
@@ -165,7 +169,7 @@ def test_it_comes_back_when_killed_and_ends_with_the_node() -> None:
         child = node.child()
         child.kill()
         child.wait(10)
-        wait_for(lambda: node.ask(Pose(name="home")) is not None, "a new one", 60)
+        wait_for(lambda: node.ask(Pose(name="home")) is not None, "a new one", 120)
         child = node.child()
         node.process.kill()
         node.process.wait()
