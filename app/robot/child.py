@@ -67,7 +67,7 @@ class Child:
 
     @staticmethod
     def _end(process: subprocess.Popen[bytes]) -> None:
-        """By the thread that started it; the kernel kills what outlives that one (`give_way`)."""
+        """By the thread that started it; without that one the kernel kills who gave way."""
         process.terminate()
         try:
             process.wait(_STOP_S)

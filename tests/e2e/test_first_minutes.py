@@ -8,7 +8,7 @@ from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import OpenPage
 from tests.e2e.person import person_script
-from tests.e2e.running import Server, put_at_rest, wait_for
+from tests.e2e.running import MINE, Server, put_at_rest, wait_for
 
 pytestmark = pytest.mark.e2e
 
@@ -107,7 +107,7 @@ def test_a_newcomer_teaches_ten_gestures_and_drives_within_two_minutes(
     expect(page.locator("#first-open")).to_be_hidden()
     page.click("#btn-start")
     page.click("#start-camera")
-    wait_for(page, "window.farhand.robot.controller === window.farhand.hello.session")
+    wait_for(page, MINE)
     assert page.evaluate("window.farhand.robot.armed") is False
 
 
@@ -153,7 +153,7 @@ def test_it_can_be_left_at_any_moment_and_goes_on_where_it_was_left(
     at(page, "teach")
     # What is shown here moves nothing: an arm that is armed is disarmed.
     page.keyboard.press("c")
-    wait_for(page, "window.farhand.robot.controller === window.farhand.hello.session")
+    wait_for(page, MINE)
     page.keyboard.press("a")
     expect(page.locator("#notices")).to_contain_text("Disarmed, so that")
     wait_for(page, "!window.farhand.robot.armed")

@@ -8,7 +8,7 @@ from playwright.sync_api import Page, expect
 from app.gateway.tokens import TokenStore
 from tests.e2e.conftest import OpenPage
 from tests.e2e.person import person_script
-from tests.e2e.running import TOKEN, Server, press_until, take_and_arm, wait_for
+from tests.e2e.running import MINE, TOKEN, Server, press_until, take_and_arm, wait_for
 
 pytestmark = pytest.mark.e2e
 
@@ -51,8 +51,7 @@ def test_button_key_and_gesture_stop_alike_for_who_drives_and_who_watches(
     wait_for(drives, "window.farhand?.robot?.mode === 'disarmed'")
     drives.evaluate("person.follows = false")
     drives.click("#choose-camera")
-    drives.click("#btn-control")
-    wait_for(drives, "window.farhand.robot.controller === window.farhand.hello.session")
+    press_until(drives, "#btn-control", MINE)
     name = drives.evaluate("window.farhand.hello.session")
 
     ways = {
