@@ -139,6 +139,8 @@ class GestureDriver:
     runs_on: dict[str, float] = field(default_factory=lambda: {"crawl": 0.015, "full": 0.06})
     """m, from letting go (as seen then, a reaction late) to standing."""
     showings: list[Showing] = field(default_factory=list)
+    astray: bool = False
+    """The last showing was taken for another sign, and the tool is where it should not be."""
     _gives_up: float | None = None
     _since: float | None = None
     """Since when the robot has been seen moving in this showing."""
@@ -151,15 +153,19 @@ class GestureDriver:
     def to(self, axis: int, target: float, within: float) -> float:
         """Bring one coordinate of the tool to ``target``, in one showing or more.
 
+        Breaks off where a sign that was mistaken has led elsewhere, see :attr:`astray`, or where
+        something is in the way.
+
         Returns:
             How far off it is in the end, m.
 
         Raises:
             CannotDrive: patience is at its end, or the robot is stopped.
         """
+        self.astray = False
         while abs(off := target - _tool(self.eyes.now())[axis]) > within:
             self._jog(axis, off, target)
-            if self._blocked():
+            if self.astray or self._blocked():
                 break
         return float(off)
 
@@ -191,9 +197,9 @@ class GestureDriver:
         self._since = None
         began, start = self.clock.now(), _tool(self.eyes.now())
         rested = self.webcam.raise_hand(gesture)
-        while not self._lets_go(rested, enough, longest) and not self._astray(axis, gesture, start):
+        while not self._lets_go(rested, enough, longest) and not self._leads(axis, gesture, start):
             self.clock.sleep(0.01)
-        astray = self._astray(axis, gesture, start)
+        self.astray = self._leads(axis, gesture, start)
         speed, driving = self._speed(), self.eyes.now().mode == "moving"
         seen = _tool(self.eyes.see())
         self.webcam.lower_hand(wait=False)
@@ -209,12 +215,12 @@ class GestureDriver:
             self.runs_on[speed] += LEARNS * (runs_on - self.runs_on[speed])
         self.showings.append(Showing(gesture, began, rested, self._since, let_go, stood, way))
         broken_off = axis is not None and not driving and self.eyes.see().mode == "armed"
-        if self._since is None or broken_off or astray:
+        if self._since is None or broken_off or self.astray:
             # The sign was not understood, or not all the time: show it a little differently.
             self.webcam.person = replace(self.webcam.person, seed=self.webcam.person.seed + 1)
 
-    def _astray(self, axis: int | None, gesture: str, start: F64) -> bool:
-        """The robot is seen to do something else than what was shown."""
+    def _leads(self, axis: int | None, gesture: str, start: F64) -> bool:
+        """The robot is seen to go elsewhere than what was shown says."""
         moved = _tool(self.eyes.see()) - start
         if axis is not None:
             towards = 1.0 if gesture == MOVES[axis][0] else -1.0

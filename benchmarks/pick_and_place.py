@@ -147,18 +147,21 @@ def pick_and_place(
         seconds[name] = eyes.clock.now() - began
         at_phase(name)
 
+    def over_tray() -> None:
+        above(driver, np.array([*tray.middle, 0.0]), 0.04, 0.03)
+
     with phase("above the cube"):
         above(driver, place, 0.009, 0.011)
     with phase("grasp"):
         grasped = grasp(driver, place)
     with phase("up"):
-        driver.to(Z, grasped + CARRY, 0.03)
+        to_height(driver, grasped + CARRY, 0.03)
         if cube(eyes.now())[Z] < place[Z] + CARRY / 2:
             raise CannotDrive("the cube did not come along")
     with phase("over the tray"):
-        above(driver, np.array([*tray.middle, 0.0]), 0.04, 0.03)
+        over_tray()
     with phase("down into it"):
-        driver.to(Z, grasped + DROP, 0.02)
+        to_height(driver, grasped + DROP, 0.02, over_tray)
     with phase("open"):
         driver.grip("open", lambda state: state.gripper > 0.06)
     return seconds
@@ -172,8 +175,30 @@ def above(driver: GestureDriver, place: F64, within_y: float, within_x: float) -
     """
     while True:
         driver.to(Y, place[Y], within_y)
-        driver.to(X, place[X], within_x)
-        if abs(driver.eyes.now().tool_position[Y] - place[Y]) <= within_y:
+        if not driver.astray:
+            driver.to(X, place[X], within_x)
+        if not driver.astray and abs(driver.eyes.now().tool_position[Y] - place[Y]) <= within_y:
+            return
+
+
+def to_height(
+    driver: GestureDriver, height: float, within: float, first: Callable[[], None] = lambda: None
+) -> None:
+    """Bring the tool to a height; again, if a sign that was mistaken led it away.
+
+    Args:
+        driver: Does it.
+        height: m.
+        within: m.
+        first: Brings the tool above its place, each time.
+
+    Raises:
+        CannotDrive: patience is at its end, or the robot is stopped.
+    """
+    while True:
+        first()
+        driver.to(Z, height, within)
+        if not driver.astray:
             return
 
 
@@ -187,10 +212,13 @@ def grasp(driver: GestureDriver, place: F64) -> float:
         CannotDrive: patience is at its end, or the robot is stopped.
     """
     eyes = driver.eyes
-    while True:
-        driver.to(Z, place[Z] + 0.07, 0.03)
+
+    def over_cube() -> None:
         above(driver, place, 0.009, 0.011)
-        driver.to(Z, place[Z] + GRASP, 0.012)
+
+    while True:
+        to_height(driver, place[Z] + 0.07, 0.03)
+        to_height(driver, place[Z] + GRASP, 0.012, over_cube)
         tool = np.asarray(eyes.now().tool_position)
         if np.abs(tool - place).max() > 0.02:
             continue
@@ -270,12 +298,14 @@ def virtual_run(seed: int, motion: ArmMotionSettings | None = None) -> Run:
 
 
 def _keep(api: httpx.Client, page: Page, stem: Path) -> None:
-    """Keep what the robot's cameras show, and the page at the end."""
+    """Keep what the robot's cameras show; at the end the page too, and what was recognised."""
     for camera in ("scene", "wrist"):
         picture = api.get(f"/api/cameras/{camera}.jpg").content
         stem.with_name(f"{stem.name}-{camera}.jpg").write_bytes(picture)
     if stem.name.endswith("end"):
         page.screenshot(path=stem.with_name(f"{stem.name}-page.png"))
+        timeline = api.get("/api/timeline.jsonl").text
+        stem.with_name(f"{stem.name}-timeline.jsonl").write_text(timeline)
 
 
 def tell(number: int, run: Run) -> None:

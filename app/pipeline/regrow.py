@@ -44,8 +44,10 @@ def regrow(share: F32, seen: U8, threshold: float) -> F32:
     Returns:
         (h, w), the share, 1 where a piece is given back; the same array when none is.
     """
-    hand: U8 = (share > threshold).view(np.uint8)
-    rest = (cv2.dilate(hand, _RIM) == 0) & (share < REST)
+    found: U8 = (share > threshold).view(np.uint8)
+    # A finger whose root alone was lost lies apart from the hand, and is lost with it.
+    hand = _largest(found)
+    rest = (cv2.dilate(found, _RIM) == 0) & (share < REST)
     along = colour_axis(
         np.asarray(cv2.resize(seen, share.shape[::-1], interpolation=cv2.INTER_AREA), np.float32),
         share > HAND,
@@ -53,7 +55,7 @@ def regrow(share: F32, seen: U8, threshold: float) -> F32:
     )
     if along is None:
         return share
-    like = (along > LIKE).view(np.uint8) | hand
+    like = (along > LIKE).view(np.uint8) | found
     more = like & ~hand & 1
     framed = cv2.copyMakeBorder(hand, 1, 1, 1, 1, cv2.BORDER_CONSTANT)
     palm = float(cv2.distanceTransform(framed, cv2.DIST_L2, 3).max())
@@ -73,6 +75,14 @@ def regrow(share: F32, seen: U8, threshold: float) -> F32:
     if cv2.countNonZero(fingers) > MOST * cv2.countNonZero(hand):
         return share
     return np.where(fingers != 0, np.float32(1.0), share)
+
+
+def _largest(mask: U8) -> U8:
+    """The largest connected piece of a mask of 0 and 1; an empty one as it is."""
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask)
+    if count <= 2:
+        return mask
+    return (labels == 1 + stats[1:, cv2.CC_STAT_AREA].argmax()).view(np.uint8)
 
 
 def colour_axis(colours: F32, hand: NDArray[np.bool_], rest: NDArray[np.bool_]) -> F32 | None:

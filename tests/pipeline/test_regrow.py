@@ -36,6 +36,17 @@ def test_a_lost_finger_comes_back():
     assert grown[:10].max() == 0 and grown[:, :20].max() == 0
 
 
+def test_a_finger_whose_root_alone_was_lost_comes_back():
+    share, seen = scene(FINGER)
+    (left, top), (right, _) = FINGER
+    share[top:33, left : right + 1] = 1
+    pieces, _ = cv2.connectedComponents((share > THRESHOLD).astype(np.uint8))
+    assert pieces == 3  # the rest, the fist and the finger
+    grown = regrow(share, seen, THRESHOLD)
+    pieces, _ = cv2.connectedComponents((grown > THRESHOLD).astype(np.uint8))
+    assert pieces == 2  # the rest, and one hand
+
+
 def test_the_share_itself_is_given_when_nothing_is_lost():
     share, seen = scene()
     assert regrow(share, seen, THRESHOLD) is share

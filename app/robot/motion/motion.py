@@ -37,8 +37,6 @@ from app.robot.motion.trajectory import JointTrajectory
 from app.robot.motion.turn_joint import JointTurn
 from app.robot.motion.wait import Pause
 
-_FINGERS_STILL = 0.002
-"""m/s"""
 _PLANNED_EXTRA = 0.005
 """m; planned ways keep so much farther off than the stop distances, so that nothing stops them."""
 
@@ -76,10 +74,7 @@ class Motion:
         """Why the newest action ended although it was not done."""
         self._task: Task | None = None
         self._limits: tuple[str, ...] = ()
-        self._force: float | None = None
         self._braking_hard = False
-        self._width: float | None = None
-        self._finger_speed = 0.0
 
     @property
     def busy(self) -> bool:
@@ -142,15 +137,14 @@ class Motion:
         self._limits = ()
         if self._task is not None and not self._task.release():
             self._task = None
-        self._keep_fingers()
 
     def halt(self) -> None:
         """A stop: come to rest at once, within 200 ms."""
+        if self._task is not None:
+            self._task.release()  # what it moves besides the joints
         self._task = None
         self._limits = ()
-        if not self._braking_hard:
-            self._braking_hard = True
-            self._keep_fingers()
+        self._braking_hard = True
 
     def reset(self, joints: Vector) -> None:
         """Be at rest where the arm really is, at ``joints`` (rad, shape (n,))."""
@@ -162,9 +156,6 @@ class Motion:
 
     def step(self, reading: Reading) -> None:
         """Move the trajectory on by one step."""
-        if self._width is not None:
-            self._finger_speed = (reading.gripper - self._width) / self.trajectory.dt
-        self._width = reading.gripper
         trajectory = self.trajectory
         self.guard.watch(reading, trajectory.position, standing=trajectory.at_rest)
         if self._task is not None:
@@ -196,12 +187,6 @@ class Motion:
             self._task = None
             self.gave_up = refused.why
             self._limits = (refused.why,)
-
-    def _keep_fingers(self) -> None:
-        """Fingers on their way stop where they are; fingers that hold something go on holding."""
-        gripping = isinstance(self.action, Gripper | Sequence)
-        if gripping and self._width is not None and abs(self._finger_speed) > _FINGERS_STILL:
-            self._arm.grip(self._width, self._force)
 
     def _task_of(self, action: Action | Step) -> Task:
         match action:
@@ -246,7 +231,6 @@ class Motion:
         if force is not None and strongest is not None and force > strongest:
             clipped.append(AtWork(f"the gripper presses with {strongest:g} N at most", "gripper"))
             force = strongest
-        self._force = force
         return Grip(width, force, self._arm.grip, tuple(clipped))
 
     def _go_clear(self, target: tuple[float, ...] | Vector, name: str) -> Task:

@@ -22,7 +22,7 @@ class Task(Protocol):
     """One action being done. Begins with the arm at rest; ``step`` is called once a cycle.
 
     ``trajectory.scale`` times ``trajectory.slowed`` is the part of its speed that it may use now. A
-    task that ends leaves the arm at rest. In a stop, it just stops being called.
+    task that ends leaves the arm at rest. In a stop it is let go, and not called any more.
     """
 
     limits: tuple[str, ...]

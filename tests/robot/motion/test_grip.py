@@ -33,3 +33,35 @@ def test_fingers_let_go_on_the_way_keep_their_force() -> None:
     rig.run(0.5)
     assert 0.03 < rig.arm.width < 0.06
     assert rig.arm.force == 5.0
+
+
+def test_fingers_let_go_before_they_were_told_anything_are_told_nothing() -> None:
+    rig = Rig()
+    rig.motion.begin(Gripper(width=0.0))
+    rig.finish()
+    rig.motion.begin(Gripper(width=0.08))
+    rig.motion.release()
+    rig.run(0.5)
+    assert rig.arm.wanted_width == 0.0
+
+
+def test_fingers_that_hold_what_still_turns_between_them_go_on_holding() -> None:
+    rig = Rig()
+    rig.motion.begin(Gripper(width=0.0, force=5.0))
+    rig.run(0.1)
+    rig.arm.held = "red_cube"
+    rig.step()
+    rig.motion.release()
+    assert rig.arm.wanted_width == 0.0
+
+
+def test_fingers_let_go_while_they_open_stop_though_something_is_held() -> None:
+    rig = Rig()
+    rig.motion.begin(Gripper(width=0.0))
+    rig.finish()
+    rig.arm.held = "red_cube"
+    rig.motion.begin(Gripper(width=0.08))
+    rig.run(0.1)
+    rig.motion.halt()
+    rig.run(0.5)
+    assert 0.0 < rig.arm.width < 0.06

@@ -17,21 +17,35 @@ def position_of(arm: SimulatedArm, name: str) -> np.ndarray:
     return np.array({thing.name: thing.position for thing in arm.read().objects}[name])
 
 
-def grasp(driver: Driver, name: str, force: float | None = None) -> np.ndarray:
-    """Close the gripper on a thing and lift it 10 cm; returns the joints at the end."""
-    arm = driver.arm
-    place = position_of(arm, name)
+def ways_to(arm: SimulatedArm, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Joints with the tool 10 cm above a place, and at it."""
     above = arm.kinematics.inverse(
         ToolPose(place + np.array([0, 0, 0.1]), DOWN), np.array(arm.model.poses["ready"])
     )
     at = arm.kinematics.inverse(ToolPose(place, DOWN), above.joints)
     assert above.converged and at.converged
-    driver.go(above.joints, 1.5)
-    driver.go(at.joints, 1.0)
+    return above.joints, at.joints
+
+
+def turn_about_z(arm: SimulatedArm, name: str, angle: float) -> None:
+    """Set a thing down where it is, turned by an angle (rad)."""
+    body = next(body for thing, body in arm._moving if thing == name)
+    turned = pybullet.getQuaternionFromEuler([0, 0, angle])
+    pybullet.resetBasePositionAndOrientation(
+        body, position_of(arm, name), turned, physicsClientId=arm.client
+    )
+
+
+def grasp(driver: Driver, name: str, force: float | None = None) -> np.ndarray:
+    """Close the gripper on a thing and lift it 10 cm; returns the joints at the end."""
+    arm = driver.arm
+    above, at = ways_to(arm, position_of(arm, name))
+    driver.go(above, 1.5)
+    driver.go(at, 1.0)
     arm.grip(0.0, force)
     driver.wait(0.8)
-    driver.go(above.joints, 1.0)
-    return above.joints
+    driver.go(above, 1.0)
+    return above
 
 
 def test_is_an_arm_and_describes_itself(arm: SimulatedArm) -> None:

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from app.config import ArmMotionSettings
-from app.link.actions import Action, JogCartesian, JogJoint
+from app.link.actions import Action, Gripper, JogCartesian, JogJoint
 from app.robot.arm import Vector
 from app.robot.motion.motion import Motion
 from app.robot.motion.rotation import rotate
 from app.robot.sim.arm import SimulatedArm
 from app.robot.sim.world import STEPS_PER_SECOND
 from tests.robot.sim.conftest import Driver
-from tests.robot.sim.test_arm import grasp, position_of
+from tests.robot.sim.test_arm import grasp, position_of, turn_about_z, ways_to
 
 CUBE = "red_cube"
 INVERSE = np.array([1.0, -1.0, -1.0, -1.0])
@@ -77,6 +77,31 @@ def test_what_is_held_stays_in_the_hand_in_every_motion_and_stop(
         assert np.linalg.norm(in_the_hand(driver.arm) - held) < 0.001
 
     carry(driver, look)
+
+
+@pytest.mark.parametrize("cycles", [8, 24, 64])
+def test_a_thing_askew_is_held_however_soon_the_gesture_is_let_go(
+    driver: Driver, cycles: int
+) -> None:
+    """It turns into its place between the fingers, for about 0.3 s."""
+    arm = driver.arm
+    place = position_of(arm, CUBE)
+    turn_about_z(arm, CUBE, np.deg2rad(12))
+    above, at = ways_to(arm, place)
+    driver.go(above, 1.5)
+    driver.go(at, 1.0)
+    motion = Motion(arm, ArmMotionSettings(), 1 / STEPS_PER_SECOND)
+    motion.begin(Gripper(width=0.0))
+    since = 0
+    while since < cycles:
+        reading = arm.read()
+        since += reading.held == CUBE
+        motion.step(reading)
+        arm.step()
+    motion.release()
+    driver.wait(0.5)
+    driver.go(above, 1.0)
+    assert position_of(arm, CUBE)[2] - place[2] == pytest.approx(0.1, abs=0.01)
 
 
 def test_what_is_held_too_softly_slips_in_a_stop(driver: Driver) -> None:
