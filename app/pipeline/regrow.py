@@ -82,7 +82,8 @@ def _largest(mask: U8) -> U8:
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask)
     if count <= 2:
         return mask
-    return (labels == 1 + stats[1:, cv2.CC_STAT_AREA].argmax()).view(np.uint8)
+    largest: U8 = (labels == 1 + stats[1:, cv2.CC_STAT_AREA].argmax()).view(np.uint8)
+    return largest
 
 
 def colour_axis(colours: F32, hand: NDArray[np.bool_], rest: NDArray[np.bool_]) -> F32 | None:
