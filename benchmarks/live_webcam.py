@@ -112,10 +112,14 @@ class LiveWebcam:
         Raises:
             TimeoutError: the picture is not live.
         """
-        self._wanted = gesture
+        self.begin_to_raise(gesture)
         self._wait_until(lambda: self._rests_since is not None)
         assert self._rests_since is not None
         return self._rests_since
+
+    def begin_to_raise(self, gesture: str) -> None:
+        """The hand starts on its way up with the next picture."""
+        self._wanted = gesture
 
     def lower_hand(self, *, wait: bool = True) -> None:
         """Take the hand out of view.

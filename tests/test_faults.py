@@ -5,6 +5,7 @@ them to the promise itself.
 """
 
 import asyncio
+import itertools
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -14,8 +15,9 @@ from urllib.parse import urlsplit
 import pytest
 
 from benchmarks import estop, node_faults, stale_burst
-from benchmarks.observer import STANDSTILL_MS, Observer, wait
-from benchmarks.rig import Rig
+from benchmarks.observer import STANDSTILL_MS, Observer, tick_now, wait, wait_async
+from benchmarks.operator import Operator
+from benchmarks.rig import TOKEN, Rig, clip
 from benchmarks.standstill import (
     NotAtFullSpeed,
     Outcome,
@@ -24,6 +26,7 @@ from benchmarks.standstill import (
     network_blackholed,
 )
 from tests.proxy import Proxy
+from tests.reordering import Reordering
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +77,44 @@ def test_commands_that_a_stall_delayed_move_nothing() -> None:
     for outcome in stale_burst.node_bursts(2):
         assert outcome.delayed > 10
         assert (outcome.acted_on, outcome.moved, outcome.drove_again) == (0, False, True)
+
+
+def test_pictures_that_overtake_one_another_and_get_lost_drive_and_stop_as_ever(rig: Rig) -> None:
+    with Reordering(urlsplit(rig.url).port or 0) as link:
+        asyncio.run(drive_over(rig, f"http://127.0.0.1:{link.port}"))
+        assert link.overtaken > 10 and link.dropped > 0
+
+
+async def drive_over(rig: Rig, url: str) -> None:
+    """At full speed, to rest when the hand goes, at full speed again, and the stop."""
+    observer = rig.observer
+    await wait_async(lambda: observer.state.controller is None, "nobody drives")
+    observer.forget()
+    async with Operator(url, TOKEN) as operator:
+
+        async def to_full_speed() -> None:
+            shown = clip(rig.next_gesture()).shown()
+            async with asyncio.timeout(60):
+                await operator.play(shown, until=observer.at_full_speed, flood=True)
+
+        await operator.take_and_arm()
+        await to_full_speed()
+        nothing = itertools.cycle(clip("left").before[:20])
+        async with asyncio.timeout(30):
+            await operator.play(nothing, until=observer.stands, flood=True)
+        stood = tick_now()
+        await operator.play(itertools.islice(nothing, 30), flood=True)
+        assert not observer.moved_between(stood, tick_now())
+        await to_full_speed()
+        await operator.say("stop")
+        await wait_async(lambda: observer.state.mode == "stopped" and observer.stands(), "the stop")
+        numbers = [frame["seq"] for frame in operator.frames]
+        refused = operator.errors
+    assert numbers == sorted(set(numbers)), "an older picture was taken for news"
+    assert not refused
+    # Commands go by what was looked at, in its order.
+    sequence = [command.sequence for _, command in observer.commands]
+    assert sequence == sorted(sequence)
 
 
 def test_a_gateway_that_is_stopped_and_goes_on(rig: Rig) -> None:

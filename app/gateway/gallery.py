@@ -1,9 +1,10 @@
 """The gesture database as the sessions need it: a fitted matcher, and the action of each name."""
 
+import hashlib
 import logging
 import threading
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -101,12 +102,22 @@ def open_for_server(settings: Settings) -> tuple[GestureStore, Hold | None]:
         raise
 
 
-def fit(templates: Sequence[tuple[str, bytes]], settings: PipelineSettings) -> PcaMatcher:
-    """A matcher for (name, 600 bytes) pairs."""
+Progress = Callable[[int, int], None]
+"""Told how much is done, of how much; what it raises ends the work."""
+Pairs = Sequence[tuple[str, bytes]]
+"""Name and template (600 bytes) of every active sample."""
+
+
+def _quietly(done: int, total: int) -> None:
+    """Nobody asks how far it is."""
+
+
+def fit(templates: Pairs, settings: PipelineSettings, progress: Progress = _quietly) -> PcaMatcher:
+    """A matcher for these samples."""
     images = [unpack_template(template) for _, template in templates]
     stacked = np.stack(images) if images else np.zeros((0, 80, 60), np.uint8)
     gallery = Gallery(labels=tuple(name for name, _ in templates), templates=stacked)
-    return PcaMatcher.fit(gallery, settings.match)
+    return PcaMatcher.fit(gallery, settings.match, progress)
 
 
 def build_matcher(
@@ -150,6 +161,7 @@ class LiveGallery:
         self._lock = threading.Lock()
         self._users: Counter[str] = Counter((SHARED,))
         self._version = store.version
+        self._prepared: tuple[bytes, PcaMatcher] | None = None
         self._fitted = {SHARED: self._read(SHARED)}
 
     @property
@@ -194,6 +206,18 @@ class LiveGallery:
                 self._forget_unused()
             return found
 
+    def prepare(self, pairs: Pairs, progress: Progress = _quietly) -> None:
+        """Learn what a gallery is about to hold, so that :meth:`refresh` need not.
+
+        Takes as long as fitting a matcher; not for the event loop. The newest is kept, until a
+        gallery holds it.
+
+        Args:
+            pairs: What it will hold.
+            progress: As for :meth:`PcaMatcher.fit <app.pipeline.PcaMatcher.fit>`.
+        """
+        self._prepared = _digest(pairs), fit(pairs, self._settings, progress)
+
     def refresh(self) -> bool:
         """Read the galleries in use again if anything changed, whichever process changed it.
 
@@ -231,9 +255,24 @@ class LiveGallery:
             (gesture.name, sample.template) for gesture in content for sample in gesture.samples
         ]
         actions = {gesture.name: gesture.action for gesture in content}
-        return Enrolled(version, fit(pairs, self._settings), actions, id, content)
+        return Enrolled(version, self._matcher(pairs), actions, id, content)
+
+    def _matcher(self, pairs: Pairs) -> PcaMatcher:
+        prepared = self._prepared
+        if prepared is not None and prepared[0] == _digest(pairs):
+            self._prepared = None
+            return prepared[1]
+        return fit(pairs, self._settings)
 
     def _forget_unused(self) -> None:
         unused = [id for id in self._fitted if self._users[id] <= 0]
         for id in unused[:-SPARE]:
             del self._fitted[id]
+
+
+def _digest(pairs: Pairs) -> bytes:
+    """The same for the same samples of the same names, in whatever order the names come."""
+    digest = hashlib.sha256()
+    for name, template in sorted(pairs, key=lambda pair: pair[0]):
+        digest.update(repr(name).encode() + template)
+    return digest.digest()

@@ -73,7 +73,7 @@ async def start_import(
         str | None, Query(max_length=64, description="of the answer to check: do only that")
     ] = None,
 ) -> dict[str, Any]:
-    """A job: reads the whole file first, then takes in all of it or nothing."""
+    """A job: reads the whole file, learns it, then takes in all of it or nothing."""
     hub = hub_of(request)
     hub.jobs.check_free()
     await asyncio.to_thread(hub.store.galleries.get, id)
@@ -105,16 +105,24 @@ def _import(
     job: Job,
     offer: UndoOffer,
 ) -> Plan:
-    # Half of the work is reading; the numbers go on from there.
-    entries = read_zip(data, lambda done, total: job.progress(done, 2 * total))
+    # A third of the way each: to read it, to learn what the gallery will hold, to write it.
+    # Learning takes longest, and comes before anything is changed, so that it can be cancelled.
+    entries = read_zip(data, lambda done, total: job.progress(done, 3 * total))
     read = len(entries)
+    there = hub.store.list(id)
+    planned = plan_of(there, entries, existing)
+    if planned.entries:
+        hub.gallery.prepare(
+            planned.after(there),
+            lambda done, total: job.progress(read + read * done // total, 3 * read),
+        )
     return import_entries(
         hub.store,
         entries,
         existing,
         gallery=id,
         expected=expected,
-        progress=lambda done, total: job.progress(read + done, read + total),
+        progress=lambda done, total: job.progress(2 * read + read * done // total, 3 * read),
         undo_as=offer.id,
     )
 

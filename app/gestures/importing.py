@@ -50,6 +50,17 @@ class Plan:
                 digest.update(template)
         return digest.hexdigest()[:32]
 
+    def after(self, there: Iterable[Gesture]) -> list[tuple[str, bytes]]:
+        """Name and template of every active sample of a gallery that holds ``there``, when done."""
+        written = {name_key(entry.name): entry for entry in self.entries}
+        kept = entries_of(one for one in there if name_key(one.name) not in written)
+        return [
+            (entry.name, template)
+            for entry in (*kept, *written.values())
+            if entry.active
+            for template in entry.templates
+        ]
+
 
 def plan_of(there: Iterable[Gesture], entries: Sequence[NewGesture], existing: Existing) -> Plan:
     """Say what importing would do to a gallery that holds ``there``."""

@@ -1,7 +1,7 @@
 """PCA match: nearest enrolled template among the principal components, or unknown."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Self
 
@@ -113,21 +113,36 @@ class PcaMatcher:
         self._features = Features(settings)
 
     @classmethod
-    def fit(cls, gallery: Gallery, settings: MatchSettings) -> Self:
-        """Learn a gallery. An empty one is allowed: nothing ever matches then."""
+    def fit(
+        cls,
+        gallery: Gallery,
+        settings: MatchSettings,
+        progress: Callable[[int, int], None] = lambda done, total: None,
+    ) -> Self:
+        """Learn a gallery. An empty one is allowed: nothing ever matches then.
+
+        Args:
+            gallery: What is enrolled.
+            settings: How to match.
+            progress: Told before each template how many are learned, of how many; what it raises
+                ends the work.
+        """
         matcher = cls(settings)
         if gallery.labels:
-            matcher._fit(gallery)
+            matcher._fit(gallery, progress)
         return matcher
 
-    def _fit(self, gallery: Gallery) -> None:
+    def _fit(self, gallery: Gallery, progress: Callable[[int, int], None]) -> None:
         order = sorted(range(len(gallery.labels)), key=lambda i: gallery.labels[i])
         labels = [gallery.labels[i] for i in order]
         self.labels = tuple(dict.fromkeys(labels))
         first = {label: i for i, label in reversed(list(enumerate(labels)))}
         self.templates = tuple((label, i - first[label]) for i, label in enumerate(labels))
         views = Views(self.settings)
-        per_template = [self._features(views.of_template(gallery.templates[i])) for i in order]
+        per_template = []
+        for done, i in enumerate(order):
+            progress(done, len(order))
+            per_template.append(self._features(views.of_template(gallery.templates[i])))
         rows = np.concatenate(per_template)
         owner = np.repeat(np.arange(len(order)), [len(part) for part in per_template])
         self._dimensions = views.width * views.height

@@ -9,19 +9,19 @@ import { GalleryKeeper } from "./core/galleries.js";
 import { GamepadReader } from "./core/gamepad.js";
 import { Held } from "./core/held.js";
 import { inspection } from "./core/inspection.js";
-import { grabStill, Stills } from "./core/jpeg.js";
+import { Stills } from "./core/jpeg.js";
 import { Latency } from "./core/latency.js";
 import { memory } from "./core/memory.js";
 import { changesFor, INITIAL_STATE } from "./core/messages.js";
 import { OperatorLink } from "./core/operator-link.js";
 import { PictureReport } from "./core/picture-report.js";
-import { preflight } from "./core/preflight.js";
 import { SourceKeeper } from "./core/source-keeper.js";
 import { ServerClock } from "./core/server-clock.js";
 import { SettingsKeeper } from "./core/settings.js";
 import { Stopper } from "./core/stopper.js";
 import { Store } from "./core/store.js";
 import { texts, told, toldError } from "./texts/texts.js";
+import { Opening } from "./opening.js";
 import { Control } from "./ui/control.js";
 import { setHidden, setText } from "./ui/dom.js";
 import { dockButtons, steps, stopButton } from "./ui/dock.js";
@@ -34,10 +34,9 @@ import { Notices } from "./ui/notices.js";
 import { operatorView } from "./ui/operator-view.js";
 import { isDriving, keepRootClasses, preparePage } from "./ui/page.js";
 import { askingNotice } from "./ui/people.js";
-import { preflightContent } from "./ui/preflight.js";
 import { readout } from "./ui/readout.js";
 import { sentence } from "./ui/sentence.js";
-import { askContent, goneContent, helpContent, Sheets } from "./ui/sheets.js";
+import { goneContent, helpContent, Sheets } from "./ui/sheets.js";
 import { knownSpeed, safeSpeed, speed, speedOf } from "./ui/speed.js";
 import { stage } from "./ui/stage.js";
 import { Starting } from "./ui/starting.js";
@@ -189,7 +188,7 @@ link.addEventListener("state", async ({ detail }) => {
             }
         }
         if (check !== signInCheck || link.isOpen) return;
-        if (answered && !hadSession && ++closedTries === CLOSED_TRIES) checkBrowser();
+        if (answered && !hadSession && ++closedTries === CLOSED_TRIES) opening.preflight();
         if (store.state.connection.state === "signed-out") return;
     }
     if (detail.state === "connecting" && store.state.connection.state !== "open") {
@@ -306,75 +305,6 @@ function toggleArm() {
     link.send(store.state.robot.armed ? "disarm" : "arm");
 }
 
-async function teach(gesture = null) {
-    // Loaded when first needed: most who drive never teach.
-    const { teachContent } = await import("./ui/teach.js");
-    const { content, focus, close } = teachContent({
-        gesture,
-        store,
-        video,
-        grab: () => grabStill(video),
-        recognise: (picture) => api.recognise(picture, store.state.gallery),
-        templateUrl: api.templateUrl,
-        act: {
-            create: (...gesture) => api.createGesture(...gesture, store.state.gallery),
-            update: api.updateGesture,
-            addSamples: api.addSamples,
-            remove: api.deleteGesture,
-            versions: api.versions,
-            restore: api.restoreVersion,
-            check: (...question) => api.dryRun(robotId(), ...question),
-            // Where that does not arrive, the 3D view has lost its connection, too.
-            forgetPath: (view) => api.hideDryRun(robotId(), view).catch(() => {}),
-        },
-        view3d: views.view3d,
-        async done(text, changes) {
-            sheets.close();
-            galleries.loadGestures();
-            (await undoing()).did(text, changes);
-        },
-    });
-    const title = gesture ? texts.teach.editTitle(gesture.name) : texts.teach.title;
-    sheets.show("teach", title, content, { onclose: close, focus });
-}
-
-let undo = null;
-
-/** What was changed can be taken back. */
-async function undoing() {
-    const { Undo } = await import("./ui/undo.js");
-    undo ||= new Undo({ notices, undo: api.undo });
-    return undo;
-}
-
-async function manage() {
-    const { manager } = await import("./managing.js");
-    const edit = (id) => wishes["edit-gesture"]({ id });
-    const { content, close } = await manager({ store, api, undo: await undoing(), edit });
-    sheets.show("manager", texts.manager.title, content, { onclose: close });
-}
-
-let timeline = null;
-
-async function showTimeline() {
-    if (sheets.name === "timeline") {
-        sheets.close();
-        return;
-    }
-    const { Timeline } = await import("./ui/timeline/sheet.js");
-    timeline ||= new Timeline(store, api);
-    const { content, close } = await timeline.open();
-    sheets.show("timeline", texts.timeline.open, content, { onclose: close });
-}
-
-/** Try out what the page needs, and say what is missing and how to mend it. */
-async function checkBrowser() {
-    const { content, show, done } = preflightContent();
-    sheets.show("preflight", texts.preflight.title, content);
-    await preflight(show, { running: store.state.source.state === "running" });
-    done();
-}
-
 async function reset() {
     if (link.send("reset")) return;
     try {
@@ -384,27 +314,14 @@ async function reset() {
     }
 }
 
-function askResetScene() {
-    const { title, words, yes } = texts.resetScene;
-    const go = async () => {
-        sheets.close();
-        try {
-            await api.resetScene(robotId());
-            notices.show(texts.resetScene.done, { kind: "good", name: "scene" });
-        } catch (error) {
-            notices.show(describeError(error), { kind: "bad", name: "scene" });
-        }
-    };
-    const content = askContent(words, yes, go, () => sheets.close());
-    sheets.show("reset-scene", title, content);
-}
-
 stopper.addEventListener("state", ({ detail }) => {
     store.set({ stopping: detail });
     if (detail === "failed") {
         notices.show(texts.stopFailed, { kind: "bad", name: "stop", stay: true });
     } else notices.clear("stop");
 });
+
+const opening = new Opening({ store, api, sheets, notices, galleries, views, video, robotId });
 
 const wishes = {
     stop: () => stopper.stop(),
@@ -436,23 +353,20 @@ const wishes = {
     },
     // Who moves the slider wants its speed, fine or not.
     speed: ({ speed: wanted }) => setSpeed({ speed: wanted, fine: false }),
-    "reset-scene": askResetScene,
+    "reset-scene": () => opening.resetScene(),
     help: () => {
         if (sheets.name === "help") sheets.close();
-        else sheets.show("help", texts.help.title, helpContent(() => starting.first(true), checkBrowser));
+        else sheets.show("help", texts.help.title, helpContent(() => starting.first(true), () => opening.preflight()));
     },
-    "edit-gesture": ({ id }) => {
-        const gesture = store.state.gestures.find((candidate) => candidate.id === id);
-        if (gesture) teach(gesture);
-    },
+    "edit-gesture": ({ id }) => opening.edit(id),
 };
 
 root.addEventListener("farhand:want", ({ detail }) => wishes[detail.what](detail));
 byId("help-open").addEventListener("click", wishes.help);
 byId("timeline-open").setAttribute("aria-label", texts.timeline.open);
-byId("timeline-open").addEventListener("click", showTimeline);
-byId("teach-open").addEventListener("click", () => teach());
-byId("manage-open").addEventListener("click", manage);
+byId("timeline-open").addEventListener("click", () => opening.timeline());
+byId("teach-open").addEventListener("click", () => opening.teach());
+byId("manage-open").addEventListener("click", () => opening.manage());
 
 window.farhand = inspection({
     store,

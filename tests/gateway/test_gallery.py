@@ -11,9 +11,10 @@ from app.errors import DatabaseBroken, NotFound
 from app.gateway.gallery import DATABASE_FILE, SPARE, LiveGallery
 from app.gateway.gallery_choice import GalleryChoice
 from app.gestures import GestureStore
-from app.gestures.records import SHARED
+from app.gestures.importing import import_entries, plan_of
+from app.gestures.records import SHARED, NewGesture
 from app.link.actions import Home, Stop
-from app.pipeline import extract_template, pack_template
+from app.pipeline import PcaMatcher, extract_template, pack_template
 
 SETTINGS = PipelineSettings()
 
@@ -48,6 +49,35 @@ def test_a_gallery_is_fitted_when_it_is_asked_for(store: GestureStore, live: Liv
     assert "forward" in live.current.matcher.labels
     with pytest.raises(NotFound, match="no gallery with the id 'nobody'"):
         live.of("nobody")
+
+
+def test_what_was_prepared_is_not_learned_again(
+    store: GestureStore, live: LiveGallery, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    there = store.list()
+    entries = [
+        NewGesture("more", Home(), (there[0].samples[0].template,)),
+        NewGesture("UP", Home(), (there[1].samples[0].template,)),
+        NewGesture("hidden", Home(), (bytes(300) + b"\xff" * 300,), active=False),
+    ]
+    pairs = plan_of(there, entries, "replace").after(there)
+    told: list[tuple[int, int]] = []
+    live.prepare(pairs, lambda done, total: told.append((done, total)))
+    assert told == [(done, len(pairs)) for done in range(len(pairs))]
+
+    def again(*_: object) -> None:
+        raise AssertionError("learned again")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(PcaMatcher, "fit", again)
+        import_entries(store, entries, "replace")
+        assert live.refresh()
+    assert set(live.current.matcher.labels) == {"forward", "stop", "more", "UP"}
+    assert sorted(store.templates()) == sorted(pairs)
+    # Something else than what was prepared is learned.
+    store.create("other", Home(), [there[0].samples[0].template])
+    assert live.refresh()
+    assert "other" in live.current.matcher.labels
 
 
 def test_only_what_changed_is_fitted_anew(store: GestureStore, live: LiveGallery) -> None:

@@ -22,7 +22,6 @@ export class FrameSender {
     #seq = 0;
     #pace = new SendPace();
     #inFlight = new Map(); // seq -> {capturedMs, sentAt, width, height}
-    #begunAt = -Infinity; // the frame before; what encoding takes is part of the interval
     #encoding = false;
     #fresh = null; // capture time of a picture that has not been sent
 
@@ -119,15 +118,14 @@ export class FrameSender {
             this.#pace.answered(frame.sentAt, now);
             this.counts.lost += 1;
         }
-        const { quality, halved, intervalMs } = this.#pace.wanted;
-        // Half a frame of grace: the webcam's beat and ours do not agree.
-        if (now - this.#begunAt < intervalMs - FALLBACK_INTERVAL_MS / 2) return;
+        if (!this.#pace.isDue(now)) return;
         if (this.#inFlight.size >= IN_FLIGHT || this.#link.waitingBytes > BACKLOG_BYTES) return;
         const capturedMs = this.#fresh;
         const run = this.#running;
         this.#fresh = null;
         this.#encoding = true;
-        this.#begunAt = now;
+        this.#pace.begin(now);
+        const { quality, halved } = this.#pace.wanted;
         try {
             const picture = await this.#encoder.encode(this.#video, quality, halved);
             if (!picture || run !== this.#running) return;

@@ -1,5 +1,6 @@
 // How many webcam frames go up, and how large: what the answers to them allow.
 
+const BEAT_MS = 33; // of a webcam
 const LATE_MS = 100; // an answer that comes this much later than the quickest one waited in a queue
 const QUICK_MS = 50;
 const LATE_IN_A_ROW = 2;
@@ -26,7 +27,8 @@ export const LEVELS = Object.freeze([
  * soon as two answers in a row were late against the quickest of the last minute (a long way is no
  * queue), and up a step when nearly all were quick for three seconds; a step that proves too much is
  * tried again after twice as long. What was under way at the first late answer was held up by the
- * same, and is not the second: a queue is still there for what is sent afterwards. The server paces its pictures alike (app/gateway/picture_pace.py).
+ * same, and is not the second: a queue is still there for what is sent afterwards. The server paces its
+ * pictures alike (app/gateway/picture_pace.py).
  * Times are in ms on performance.now().
  */
 export class SendPace {
@@ -41,6 +43,7 @@ export class SendPace {
     #since = null;
     #steady = STEADY_MS;
     #raisedAt = -Infinity;
+    #begunAt = -Infinity; // packing the frame before; what that takes is part of the interval
 
     get level() {
         return this.#level;
@@ -48,6 +51,17 @@ export class SendPace {
 
     get wanted() {
         return LEVELS[this.#level];
+    }
+
+    /** Whether the next frame may be packed already. */
+    isDue(now) {
+        // Half a frame of grace: the webcam's beat and ours do not agree.
+        return now - this.#begunAt >= this.wanted.intervalMs - BEAT_MS / 2;
+    }
+
+    /** A frame begins to be packed. */
+    begin(now) {
+        this.#begunAt = now;
     }
 
     /** A frame was answered, or given up. */
@@ -77,10 +91,10 @@ export class SendPace {
     forget() {
         this.#windowFrom = -Infinity;
         this.#quickest = [Infinity, Infinity];
-        this.#begin();
+        this.#judge();
     }
 
-    #begin() {
+    #judge() {
         this.#late = 0;
         this.#lateFrom = -Infinity;
         this.#answers = 0;
@@ -91,7 +105,7 @@ export class SendPace {
     /** Steady for long enough: were they quick? */
     #look(now) {
         if (this.#quick >= MOSTLY * this.#answers) this.#raise(now);
-        else this.#begin();
+        else this.#judge();
     }
 
     #lower(now) {
@@ -104,7 +118,7 @@ export class SendPace {
 
     #raise(now) {
         if (now - this.#raisedAt > LONGEST_STEADY_MS) this.#steady = STEADY_MS;
-        if (this.#level === 0) return this.#begin();
+        if (this.#level === 0) return this.#judge();
         this.#raisedAt = now;
         this.#go(this.#level - 1, now);
     }
@@ -112,6 +126,6 @@ export class SendPace {
     #go(level, now) {
         this.#level = level;
         this.#judgedFrom = now;
-        this.#begin();
+        this.#judge();
     }
 }

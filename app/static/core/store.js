@@ -11,7 +11,8 @@ export class Store {
     #state;
     #listeners = [];
     #dirty = new Set();
-    #scheduled = false;
+    #turn = 0; // the telling that is due; 0: none
+    #turns = 0;
     #toldAt = -Infinity;
 
     constructor(initial) {
@@ -44,11 +45,12 @@ export class Store {
     }
 
     #schedule() {
-        if (this.#scheduled) return;
-        this.#scheduled = true;
+        if (this.#turn) return;
+        this.#turns += 1;
+        const turn = this.#turn = this.#turns;
         const run = () => {
-            if (!this.#scheduled) return;
-            this.#scheduled = false;
+            if (turn !== this.#turn) return; // it was told, or the next one is not due yet
+            this.#turn = 0;
             this.#toldAt = performance.now();
             this.#flush();
         };

@@ -473,3 +473,27 @@ def test_a_server_without_galleries_has_the_shared_one(modules: Page) -> None:
     assert (old["gallery"], old["there"]) == ("shared", None)
     assert old["of"] == ["of shared"]
     assert play(503)["gallery"] == "g1", "that passes"
+
+
+def test_no_step_is_shown_before_the_gestures_of_who_was_chosen_are_here(modules: Page) -> None:
+    script = """
+    const source = { state: "none" };
+    const state = { gesturesState: "loading", gestures: [], galleries: null, source };
+    const store = { state, watch: () => {} };
+    const shown = [];
+    const sheets = {
+        show: (name) => { shown.push(name); return document.createElement("div"); },
+    };
+    let kept = {};
+    const progress = { get: () => ({ past: [], ...kept }), set: (next) => { kept = next; } };
+    const first = new m.FirstMinutes({
+        host: document.documentElement, store, sheets, progress, act: { isChosen: () => true },
+    });
+    await first.open();
+    await new Promise((done) => setTimeout(done, 500));
+    const before = [...shown];
+    state.gesturesState = "ready";
+    while (!shown.length) await new Promise((done) => setTimeout(done, 20));
+    return [before, shown];
+    """
+    assert run(modules, "ui/first/flow.js", script) == [[], ["first"]]

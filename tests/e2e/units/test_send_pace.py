@@ -56,6 +56,27 @@ def test_fewer_and_smaller_frames_go_up_while_answers_are_late(modules: Page) ->
     assert play("show(0, 9); pace.forget(); show(300, 40); see();") == [0]
 
 
+def test_the_interval_counts_from_the_beginning_of_one_frame_to_that_of_the_next(
+    modules: Page,
+) -> None:
+    """However long packing takes: else a slow computer would send ever fewer."""
+    script = """
+    const pace = new m.SendPace();
+    let now = 1000;
+    const due = [pace.isDue(now)];
+    pace.answered(now, now + 100);
+    for (let n = 0; n < 20; n += 1) {
+        now += 1000;
+        pace.answered(now - 900, now);
+    }
+    due.push(pace.level + 1 === m.LEVELS.length);
+    pace.begin(now);
+    for (const after of [33, 49, 67]) due.push(pace.isDue(now + after));
+    return due;
+    """
+    assert run(modules, "core/send-pace.js", script) == [True, True, False, False, True]
+
+
 def test_levels_lower_quality_then_size_then_rate_and_keep_what_recognition_needs(
     modules: Page,
 ) -> None:

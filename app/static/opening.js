@@ -1,0 +1,109 @@
+// Sheets that open when somebody asks for them. What is in them is loaded then: most who drive need none.
+
+import { grabStill } from "./core/jpeg.js";
+import { preflight } from "./core/preflight.js";
+import { texts } from "./texts/texts.js";
+import { preflightContent } from "./ui/preflight.js";
+import { askContent } from "./ui/sheets.js";
+import { describeError } from "./ui/words.js";
+
+/** Opens them. `robotId()` gives the robot's id, `views` is the stage's, `video` the operator's picture. */
+export class Opening {
+    #timeline = null;
+    #undo = null;
+
+    constructor({ store, api, sheets, notices, galleries, views, video, robotId }) {
+        Object.assign(this, { store, api, sheets, notices, galleries, views, video, robotId });
+    }
+
+    /** Teach a gesture, or change the one given. */
+    async teach(gesture = null) {
+        const { api, store, video } = this;
+        const { teachContent } = await import("./ui/teach.js");
+        const { content, focus, close } = teachContent({
+            gesture,
+            store,
+            video,
+            grab: () => grabStill(video),
+            recognise: (picture) => api.recognise(picture, store.state.gallery),
+            templateUrl: api.templateUrl,
+            act: {
+                create: (...gesture) => api.createGesture(...gesture, store.state.gallery),
+                update: api.updateGesture,
+                addSamples: api.addSamples,
+                remove: api.deleteGesture,
+                versions: api.versions,
+                restore: api.restoreVersion,
+                check: (...question) => api.dryRun(this.robotId(), ...question),
+                // Where that does not arrive, the 3D view has lost its connection, too.
+                forgetPath: (view) => api.hideDryRun(this.robotId(), view).catch(() => {}),
+            },
+            view3d: this.views.view3d,
+            done: async (text, changes) => {
+                this.sheets.close();
+                this.galleries.loadGestures();
+                (await this.#undoing()).did(text, changes);
+            },
+        });
+        const title = gesture ? texts.teach.editTitle(gesture.name) : texts.teach.title;
+        this.sheets.show("teach", title, content, { onclose: close, focus });
+    }
+
+    /** Change the gesture with this id, if it is still there. */
+    edit(id) {
+        const gesture = this.store.state.gestures.find((candidate) => candidate.id === id);
+        if (gesture) this.teach(gesture);
+    }
+
+    /** Look after all gestures. */
+    async manage() {
+        const { store, api } = this;
+        const { manager } = await import("./managing.js");
+        const undo = await this.#undoing();
+        const { content, close } = await manager({ store, api, undo, edit: (id) => this.edit(id) });
+        this.sheets.show("manager", texts.manager.title, content, { onclose: close });
+    }
+
+    /** What happened; closes it where it is open. */
+    async timeline() {
+        if (this.sheets.name === "timeline") {
+            this.sheets.close();
+            return;
+        }
+        const { Timeline } = await import("./ui/timeline/sheet.js");
+        this.#timeline ||= new Timeline(this.store, this.api);
+        const { content, close } = await this.#timeline.open();
+        this.sheets.show("timeline", texts.timeline.open, content, { onclose: close });
+    }
+
+    /** Try out what the page needs, and say what is missing and how to mend it. */
+    async preflight() {
+        const { content, show, done } = preflightContent();
+        this.sheets.show("preflight", texts.preflight.title, content);
+        await preflight(show, { running: this.store.state.source.state === "running" });
+        done();
+    }
+
+    /** Ask whether the things around the robot are to be put back, and do it. */
+    resetScene() {
+        const { title, words, yes } = texts.resetScene;
+        const go = async () => {
+            this.sheets.close();
+            try {
+                await this.api.resetScene(this.robotId());
+                this.notices.show(texts.resetScene.done, { kind: "good", name: "scene" });
+            } catch (error) {
+                this.notices.show(describeError(error), { kind: "bad", name: "scene" });
+            }
+        };
+        const content = askContent(words, yes, go, () => this.sheets.close());
+        this.sheets.show("reset-scene", title, content);
+    }
+
+    /** What was changed can be taken back. */
+    async #undoing() {
+        const { Undo } = await import("./ui/undo.js");
+        this.#undo ||= new Undo({ notices: this.notices, undo: this.api.undo });
+        return this.#undo;
+    }
+}
