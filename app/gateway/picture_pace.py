@@ -19,6 +19,9 @@ STEADY_S = 3.0
 """So long acknowledgements must be quick before the next larger level is tried."""
 MOSTLY = 0.9
 """Part of them: a busy computer holds one up now and then, at any level."""
+TRIAL_S = 1.0
+"""A level that was just gone up to is left at the first late one: a link that cannot carry it shows
+so within a second, and every picture is late until then."""
 LONGEST_STEADY_S = 60.0
 """A level that proves too much is tried again after twice as long, and at last after this."""
 WINDOW_S = 30.0
@@ -42,13 +45,15 @@ class Level(NamedTuple):
 
 LEVELS = (
     Level(30.0, 4),
+    Level(20.0, 3),
     Level(15.0, 2),
     Level(10.0, 2),
     Level(10.0, 2, 0.75, 70),
     Level(10.0, 2, 0.5, 60),
     Level(5.0, 1, 0.5, 40),
 )
-"""Best first. The rate goes down first: it costs no work, and a still picture stays sharp."""
+"""Best first. The rate goes down first: it costs no work, and a still picture stays sharp. No step
+up asks for more than twice as much: where it proves too much, pictures are late until it is left."""
 
 
 class Quickest:
@@ -84,6 +89,8 @@ class PicturePace:
         """When the first of these answers came."""
         self._steady = STEADY_S
         self._raised_at = float("-inf")
+        self._trying = False
+        """The level was gone up to, not down."""
         self._due = 0.0
         self._acknowledged = asyncio.Event()
 
@@ -135,9 +142,12 @@ class PicturePace:
             # What was under way then was held up by the same; a queue is there afterwards, too.
             self._late += 1
             self._late_from = now
-        if self._late >= LATE_IN_A_ROW and self._level + 1 < len(LEVELS):
-            if now - self._raised_at < self._steady:
+        tried_for = now - self._raised_at
+        most = 1 if self._trying and tried_for < TRIAL_S else LATE_IN_A_ROW
+        if self._late >= most and self._level + 1 < len(LEVELS):
+            if tried_for < self._steady:
                 self._steady = min(2 * self._steady, LONGEST_STEADY_S)
+            self._trying = False
             self._go(self._level + 1, now)
         elif now - self._since >= self._steady:
             if self._quick < MOSTLY * self._answers:
@@ -146,7 +156,7 @@ class PicturePace:
             if now - self._raised_at > LONGEST_STEADY_S:
                 self._steady = STEADY_S
             if self._level:
-                self._raised_at = now
+                self._raised_at, self._trying = now, True
                 self._go(self._level - 1, now)
             else:
                 self._begin()
