@@ -52,8 +52,8 @@ LEVELS = (
     Level(10.0, 2, 0.5, 60),
     Level(5.0, 1, 0.5, 40),
 )
-"""Best first. The rate goes down first: it costs no work, and a still picture stays sharp. No step
-up asks for more than twice as much: where it proves too much, pictures are late until it is left."""
+"""Best first. The rate goes down first: it costs no work, and a still picture stays sharp. The steps
+are small, because pictures come late from the one that is too much until it is left."""
 
 
 class Quickest:
