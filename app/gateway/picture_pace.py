@@ -52,7 +52,7 @@ LEVELS = (
     Level(10.0, 2, 0.5, 60),
     Level(5.0, 1, 0.5, 40),
 )
-"""Best first. The rate goes down first: it costs no work, and a still picture stays sharp. The steps
+"""Best first. The rate goes down first: it costs no work, and a still picture stays sharp. Steps
 are small, because pictures come late from the one that is too much until it is left."""
 
 
