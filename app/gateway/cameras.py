@@ -132,6 +132,6 @@ async def _listen(socket: WebSocket, pace: PicturePace | None) -> None:
     """Hear acknowledgements until the viewer is gone; all else that it sends is ignored."""
     loop = asyncio.get_running_loop()
     while (message := await socket.receive())["type"] != "websocket.disconnect":
-        sequence = acknowledged(message.get("text"))
-        if pace is not None and sequence is not None:
-            pace.acknowledge(sequence, loop.time())
+        shown = acknowledged(message.get("text"))
+        if pace is not None and shown is not None:
+            pace.acknowledge(shown, loop.time())

@@ -28,6 +28,8 @@ WINDOW_S = 30.0
 """The quickest acknowledgement is that of this window and the one before it."""
 MAX_ACK = 64
 """Characters of an acknowledgement."""
+SLOWEST_HZ, FASTEST_HZ = 1.0, 30.0
+"""What a viewer can ask for; cameras take no more."""
 
 
 class Level(NamedTuple):
@@ -92,12 +94,18 @@ class PicturePace:
         self._trying = False
         """The level was gone up to, not down."""
         self._due = 0.0
+        self._wanted_hz = FASTEST_HZ
         self._acknowledged = asyncio.Event()
 
     @property
     def level(self) -> int:
         """Index in :data:`LEVELS`."""
         return self._level
+
+    @property
+    def due(self) -> float:
+        """When the next picture may be sent."""
+        return self._due
 
     async def turn(self) -> None:
         """Wait until the viewer may be sent the next picture."""
@@ -112,14 +120,16 @@ class PicturePace:
         self._under_way.pop(sequence, None)
         self._under_way[sequence] = now
         # Half an interval of grace: the camera's beat and ours do not agree.
-        interval = 1 / LEVELS[self._level].rate_hz
+        interval = 1 / min(LEVELS[self._level].rate_hz, self._wanted_hz)
         self._due = max(self._due + interval, now + interval / 2)
 
-    def acknowledge(self, sequence: int, now: float) -> None:
+    def acknowledge(self, shown: "Shown", now: float) -> None:
         """The viewer has shown this picture, and shows none that was sent before it any more."""
+        sequence = shown.sequence
         sent = self._under_way.get(sequence)
         if sent is None:
             return
+        self._wanted_hz = shown.wanted_hz
         # By the order of sending: a camera that starts anew counts from the beginning.
         for earlier in tuple(self._under_way):
             del self._under_way[earlier]
@@ -173,8 +183,17 @@ class PicturePace:
         self._since = None
 
 
-def acknowledged(text: str | None) -> int | None:
-    """The picture that a viewer's message acknowledges; None: it is no acknowledgement."""
+class Shown(NamedTuple):
+    """What a viewer says of a picture."""
+
+    sequence: int
+    """The picture's."""
+    wanted_hz: float = FASTEST_HZ
+    """Pictures a second that it wants at most."""
+
+
+def acknowledged(text: str | None) -> Shown | None:
+    """What a viewer's message acknowledges; None: it is no acknowledgement."""
     if text is None or len(text) > MAX_ACK:
         return None
     try:
@@ -183,5 +202,8 @@ def acknowledged(text: str | None) -> int | None:
         return None
     if not isinstance(message, dict) or message.get("type") != "shown":
         return None
-    sequence = message.get("seq")
-    return sequence if type(sequence) is int else None
+    sequence, wanted = message.get("seq"), message.get("most", FASTEST_HZ)
+    if type(sequence) is not int or type(wanted) not in (int, float):
+        return None
+    # Written so that what is no number at all becomes the fastest.
+    return Shown(sequence, max(SLOWEST_HZ, min(FASTEST_HZ, wanted)))

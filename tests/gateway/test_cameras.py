@@ -151,6 +151,23 @@ def test_who_acknowledges_late_gets_smaller_pictures_and_who_does_not_gets_them_
             assert FrameHeader.unpack(whole).sequence > before
 
 
+def test_who_wants_fewer_pictures_gets_fewer(server: Running, node: StandIn) -> None:
+    with (
+        StandInCamera(node, "wrist") as camera,
+        server.socket("/ws/camera/wrist?acks=1") as viewer,
+    ):
+        viewer.send(json.dumps({"type": "shown", "seq": 0, "most": 3}))  # of nothing: no answer
+        message = viewer.recv(timeout=10)
+        got, first = 0, camera.published
+        while camera.published < first + 60:
+            sequence = FrameHeader.unpack(message).sequence
+            viewer.send(json.dumps({"type": "shown", "seq": sequence, "most": 3}))
+            message = viewer.recv(timeout=10)
+            got += 1
+        # 60 pictures take two seconds, or longer.
+        assert got <= (camera.published - first) / 10 + 6
+
+
 def test_who_acknowledges_nothing_gets_a_few_pictures_and_slows_nobody(
     server: Running, node: StandIn
 ) -> None:

@@ -6,7 +6,7 @@ import json
 import pytest
 
 from app.gateway import picture_pace
-from app.gateway.picture_pace import LEVELS, STEADY_S, PicturePace, acknowledged
+from app.gateway.picture_pace import LEVELS, STEADY_S, PicturePace, Shown, acknowledged
 
 WAY_S = 0.15
 
@@ -24,7 +24,7 @@ class Link:
             self.sequence += 1
             self.pace.sent(self.sequence, self.now)
             self.now += WAY_S + queue_s
-            self.pace.acknowledge(self.sequence, self.now)
+            self.pace.acknowledge(Shown(self.sequence), self.now)
 
     def show_for(self, seconds: float, queue_s: float = 0.0) -> None:
         until = self.now + seconds
@@ -38,7 +38,7 @@ class Link:
             self.pace.sent(sequence, start)
         for sequence in sequences:
             self.now = start + WAY_S + queue_s + sequence / 1e5
-            self.pace.acknowledge(sequence, self.now)
+            self.pace.acknowledge(Shown(sequence), self.now)
         self.sequence += 4
 
 
@@ -142,10 +142,10 @@ async def test_only_so_many_are_under_way_and_an_acknowledgement_answers_for_tho
         pace.sent(sequence, loop.time())
     turn = asyncio.create_task(pace.turn())
     for stranger in (77, -1, 2**40):
-        pace.acknowledge(stranger, loop.time())
+        pace.acknowledge(Shown(stranger), loop.time())
     done, _ = await asyncio.wait((turn,), timeout=0.2)
     assert not done
-    pace.acknowledge(LEVELS[0].under_way - 1, loop.time())
+    pace.acknowledge(Shown(LEVELS[0].under_way - 1), loop.time())
     await asyncio.wait_for(turn, 10)
     for sequence in range(10, 9 + LEVELS[0].under_way):
         pace.sent(sequence, loop.time())
@@ -157,7 +157,7 @@ async def test_a_camera_that_starts_anew_leaves_nothing_under_way() -> None:
     loop = asyncio.get_running_loop()
     for sequence in (5000, 5001, 1, 2):
         pace.sent(sequence, loop.time())
-    pace.acknowledge(2, loop.time())
+    pace.acknowledge(Shown(2), loop.time())
     for sequence in (3, 4, 5):
         pace.sent(sequence, loop.time())
     await asyncio.wait_for(pace.turn(), 10)
@@ -179,6 +179,8 @@ async def test_a_camera_that_starts_anew_leaves_nothing_under_way() -> None:
         '{"type":"shown","seq":null}',
         '{"type":"seen","seq":7}',
         '{"seq":7}',
+        '{"type":"shown","seq":7,"most":"15"}',
+        '{"type":"shown","seq":7,"most":null}',
         "[" * 64,
         json.dumps({"type": "shown", "seq": 7, "more": "x" * 64}),
     ],
@@ -187,5 +189,26 @@ def test_what_is_no_acknowledgement_is_none(text: str | None) -> None:
     assert acknowledged(text) is None
 
 
-def test_an_acknowledgement_is_read() -> None:
-    assert acknowledged('{"type":"shown","seq":4294967295}') == 4294967295
+@pytest.mark.parametrize(
+    ("more", "wanted"),
+    [
+        ("", 30), (',"most":15', 15), (',"most":7.5', 7.5), (',"most":0', 1), (',"most":-3', 1),
+        (',"most":99', 30), (',"most":1e999', 30), (',"most":NaN', 30),
+    ],
+)  # fmt: skip
+def test_an_acknowledgement_is_read(more: str, wanted: float) -> None:
+    assert acknowledged(f'{{"type":"shown","seq":4294967295{more}}}') == (4294967295, wanted)
+
+
+async def test_a_viewer_that_wants_fewer_gets_fewer() -> None:
+    pace = PicturePace()
+    now = asyncio.get_running_loop().time()
+    sent = []
+    for sequence in range(60):  # a camera's pictures, 30 a second
+        now += 1 / 30
+        if now >= pace.due:
+            pace.sent(sequence, now)
+            pace.acknowledge(Shown(sequence, 15 if sequence < 30 else 30), now)
+            sent.append(sequence)
+    assert 14 <= sum(sequence < 30 for sequence in sent) <= 17
+    assert 28 <= sum(sequence >= 30 for sequence in sent) <= 30

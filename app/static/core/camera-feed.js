@@ -3,6 +3,8 @@
 import { unpackPicture } from "./protocol.js";
 import { ReconnectingSocket, socketUrl } from "./socket.js";
 
+const MOST_HZ = 30;
+
 /**
  * Events: `picture` (detail: {bitmap, seq, tick, takenAt}; the listener closes the bitmap).
  * `takenAt` is on performance.now(): by `when(tick)`, or, while that is null, when it arrived.
@@ -19,6 +21,7 @@ export class CameraFeed extends EventTarget {
         super();
         this.#when = when;
         this.name = name;
+        this.mostHz = MOST_HZ; // pictures a second that are wanted
         this.pictures = 0;
         this.failures = 0; // tries in a row that brought no picture
         this.#socket = new ReconnectingSocket(
@@ -65,7 +68,7 @@ export class CameraFeed extends EventTarget {
                 // A broken picture is no picture; its age will show.
             }
             // Broken or not: it is not on its way any more.
-            this.#socket.send(JSON.stringify({ type: "shown", seq }));
+            this.#socket.send(JSON.stringify({ type: "shown", seq, most: this.mostHz }));
         }
         this.#decoding = false;
     }

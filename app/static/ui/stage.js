@@ -85,6 +85,9 @@ class CameraView {
     }
 }
 
+// What is only glanced at leaves the link and the computer to what is looked at.
+const LARGE_HZ = 30;
+const SMALL_HZ = 15;
 const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 
 /** How this browser draws in three dimensions: "fast", "slow" (without a GPU) or "none". */
@@ -279,7 +282,10 @@ export function stage(element, store, { feeds, onFrame, memory }) {
     document.addEventListener("visibilitychange", update);
     setInterval(() => {
         const now = performance.now();
-        for (const camera of cameras) camera.tick(now);
+        for (const camera of cameras) {
+            camera.feed.mostHz = element.dataset.large === camera.name ? LARGE_HZ : SMALL_HZ;
+            camera.tick(now);
+        }
     }, 200);
 
     let was = null;
