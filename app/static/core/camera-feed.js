@@ -6,7 +6,7 @@ import { ReconnectingSocket, socketUrl } from "./socket.js";
 const MOST_HZ = 30;
 
 /**
- * Events: `picture` (detail: {bitmap, seq, tick, takenAt}; the listener closes the bitmap).
+ * Events: `picture` (detail: {bitmap, seq, tick, takenAt}; the listener takes or closes the bitmap).
  * `takenAt` is on performance.now(): by `when(tick)`, or, while that is null, when it arrived.
  * A picture that arrives while another is being decoded replaces the one that waits. Each one that
  * was shown is acknowledged, so that the server sends no more than the way here carries.

@@ -51,6 +51,7 @@ export class Store {
         const run = () => {
             if (turn !== this.#turn) return; // it was told, or the next one is not due yet
             this.#turn = 0;
+            clearTimeout(hidden);
             this.#toldAt = performance.now();
             this.#flush();
         };
@@ -58,7 +59,7 @@ export class Store {
         if (wait > 0) setTimeout(() => requestAnimationFrame(run), wait);
         else requestAnimationFrame(run);
         // Nothing is drawn while the page is hidden, but its state goes on.
-        setTimeout(run, 250);
+        const hidden = setTimeout(run, 250);
     }
 
     #flush() {

@@ -1,93 +1,12 @@
 // What the robot sees and how it stands: two cameras and the 3D view, one of them large.
 
 import { texts, told } from "../texts/texts.js";
+import { CameraViews } from "./camera-view.js";
 import { button, el, setText } from "./dom.js";
-import { number } from "./words.js";
 
-const OLD_MS = 500; // from here on the age of a picture is shown
 const LONG_AWAY_MS = 1500; // a server that starts takes longer
 const CAMERAS = ["wrist", "scene"];
 
-/** One robot camera: draws pictures, shows their age. Opens nothing itself; it is given a feed. */
-class CameraView {
-    constructor(name, feed, { enlarge, swap }) {
-        this.name = name;
-        this.feed = feed;
-        this.takenAt = 0;
-        this.open = false;
-        this.visible = false;
-        const label = texts.stage.views[name];
-        this.canvas = el("canvas", { role: "img", "aria-label": label, width: 320, height: 240 });
-        this.age = el("span", { class: "age", data: { part: "age" } });
-        this.empty = el("p", { class: "view-empty", text: texts.stage.noPicture });
-        this.label = el("span", { text: label });
-        const title = el("p", { class: "view-title" }, this.label, this.age);
-        this.cover = el("button", {
-            type: "button",
-            class: "view-cover",
-            "aria-label": texts.stage.enlarge(label),
-            onclick: () => enlarge(name),
-        });
-        const swapButton = button("", {
-            class: "round small swap",
-            "aria-label": texts.stage.swap,
-            title: texts.stage.swap,
-            iconName: "swap",
-            onclick: swap,
-        });
-        this.element = el(
-            "div",
-            { class: "view is-empty", data: { view: name } },
-            this.canvas,
-            this.empty,
-            title,
-            this.cover,
-            el("div", { class: "view-tools" }, swapButton),
-        );
-        this.context = this.canvas.getContext("2d");
-        feed.addEventListener("picture", (event) => this.#draw(event.detail));
-    }
-
-    /** What the robot's profile calls this camera. */
-    rename(label) {
-        setText(this.label, label);
-        this.canvas.setAttribute("aria-label", label);
-        this.cover.setAttribute("aria-label", texts.stage.enlarge(label));
-    }
-
-    want(visible) {
-        if (visible === this.open) return;
-        this.open = visible;
-        if (visible) this.feed.open();
-        else this.feed.close();
-    }
-
-    tick(now) {
-        const late = this.takenAt ? now - this.takenAt : 0;
-        const old = this.open && late > OLD_MS;
-        this.element.classList.toggle("is-old", old);
-        setText(this.age, old ? texts.stage.age(number(late / 1000)) : "");
-        if (!this.takenAt && this.open) {
-            const dead = this.feed.failures > 1;
-            setText(this.empty, dead ? texts.stage.noCamera : texts.stage.noPicture);
-        }
-    }
-
-    #draw({ bitmap, takenAt }) {
-        if (this.canvas.width !== bitmap.width || this.canvas.height !== bitmap.height) {
-            this.canvas.width = bitmap.width;
-            this.canvas.height = bitmap.height;
-        }
-        this.context.drawImage(bitmap, 0, 0);
-        bitmap.close();
-        this.takenAt = takenAt;
-        this.element.classList.remove("is-empty");
-    }
-}
-
-// What is only glanced at leaves the link and the computer to what is looked at.
-const LARGE_HZ = 30;
-const SMALL_HZ = 15;
 const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 
 /** How this browser draws in three dimensions: "fast", "slow" (without a GPU) or "none". */
@@ -237,7 +156,7 @@ export function stage(element, store, { feeds, onFrame, memory }) {
         memory.set("large", name);
     };
     const swap = () => enlarge(element.dataset.large === "wrist" ? "scene" : "wrist");
-    const cameras = CAMERAS.map((name) => new CameraView(name, feeds[name], { enlarge, swap }));
+    const cameras = new CameraViews(CAMERAS, feeds, { enlarge, swap, large: () => element.dataset.large });
     const drawing = drawing3d();
     // Without a GPU the 3D view takes the very processor that the frames need: only if asked for.
     const hidden = (memory.get("hide-3d") || (drawing === "slow" ? "yes" : "no")) === "yes";
@@ -264,7 +183,7 @@ export function stage(element, store, { feeds, onFrame, memory }) {
     };
     store.watch(["description"], ({ description }) => {
         for (const { name, title } of (description && description.cameras) || []) {
-            const camera = cameras.find((candidate) => candidate.name === name);
+            const camera = cameras.named(name);
             if (camera && title) camera.rename(told(title));
         }
     });
@@ -281,11 +200,7 @@ export function stage(element, store, { feeds, onFrame, memory }) {
     for (const view of views) seen.observe(view.element);
     document.addEventListener("visibilitychange", update);
     setInterval(() => {
-        const now = performance.now();
-        for (const camera of cameras) {
-            camera.feed.mostHz = element.dataset.large === camera.name ? LARGE_HZ : SMALL_HZ;
-            camera.tick(now);
-        }
+        cameras.tick(performance.now());
     }, 200);
 
     let was = null;
