@@ -15,6 +15,7 @@ document does not say. Left out, with the reason:
 - The endless answers of ``.mjpeg``.
 """
 
+import os
 import re
 import subprocess
 import sys
@@ -24,6 +25,7 @@ from pathlib import Path
 from benchmarks.report import arguments, promise, report
 from tests.e2e.running import TOKEN, start_server, stop_server
 
+ROOT = Path(__file__).parents[1]
 TOOL = "schemathesis==4.32.5"
 LEFT_OUT = "positive_data_acceptance,allow_header_conformance"
 PHASES = "examples,coverage,fuzzing,stateful"
@@ -40,6 +42,8 @@ def cases(url: str, examples: int, seed: int) -> tuple[int, list[str], str]:
             "--exclude-path-regex", "mjpeg", "--max-examples", str(examples),
             "--seed", str(seed), "--continue-on-failure", "--no-color",
         ],
+        cwd=ROOT,
+        env={**os.environ, "SCHEMATHESIS_HOOKS": "benchmarks.api_hooks"},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
@@ -47,7 +51,8 @@ def cases(url: str, examples: int, seed: int) -> tuple[int, list[str], str]:
     count = re.search(r"(\d[\d,]*) generated", done.stdout)
     if count is None:
         raise RuntimeError(f"no cases were made:\n{done.stdout[-2000:]}")
-    found = re.findall(r"^\s+❌ (ST\d+ .+)$", done.stdout, re.MULTILINE)
+    # A route that could not be tried is no route without a fault.
+    found = re.findall(r"^\s+(?:❌|🚫) ((?:ST\d+|[A-Z]).+: \d+)$", done.stdout, re.MULTILINE)
     return int(count[1].replace(",", "")), found, done.stdout
 
 
