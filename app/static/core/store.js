@@ -1,9 +1,9 @@
 // The state of the page: one flat object, changed only through set().
 
-const EVERY_MS = 50;
+const EVERY_MS = 66;
 
 /**
- * Listeners are told with a drawn picture, and twenty times a second at most, however many messages
+ * Listeners are told with a drawn picture, and fifteen times a second at most, however many messages
  * came in between: thirty answers and twenty states of the robot a second must not become fifty
  * layouts a second on a slow laptop. What comes after a pause is told with the next picture.
  */
