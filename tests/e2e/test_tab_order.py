@@ -36,6 +36,20 @@ def server(one_server: Server) -> Server:
     return one_server
 
 
+def all_marked(page: Page) -> list[str]:
+    """Number what can be used, once nothing is about to change any more.
+
+    The page shows its state a little later than it has it.
+    """
+    names: list[str] = page.evaluate(MARK)
+    for _ in range(100):
+        page.wait_for_timeout(300)
+        before, names = names, page.evaluate(MARK)
+        if names == before:
+            return names
+    raise AssertionError("the page does not settle")
+
+
 def once_round(page: Page, most: int, key: str = "Tab") -> list[dict[str, Any]]:
     """Where each press of Tab leads, until it comes back; the page's first first."""
     found: list[dict[str, Any]] = []
@@ -66,7 +80,7 @@ def test_tab_goes_through_everything_in_its_order(
         page.click("#choose-keys")
         page.wait_for_selector("#jog [data-move=forward]")
         page.evaluate("document.activeElement.blur()")
-    names = page.evaluate(MARK)
+    names = all_marked(page)
     assert len(names) > 20
     forth = once_round(page, 3 * len(names))
     numbered = [each["at"] for each in forth]

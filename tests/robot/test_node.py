@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -42,6 +43,8 @@ def wait_for(condition: Callable[[], object], what: str, timeout: float = 15.0) 
 class Remote:
     """Drives a node over the link, and keeps every state with the node's own time."""
 
+    made: ClassVar[list["Remote"]] = []
+
     def __init__(self, endpoint: str, holder: str = "anna") -> None:
         self.holder = holder
         self.states: list[State] = []
@@ -49,6 +52,7 @@ class Remote:
         self.sequence = 0
         self.last_tick = 0
         self.end = GatewayEnd("puma", endpoint, on_state=self.states.append, timeout=30)
+        self.made.append(self)
         wait_for(lambda: self.states, "the first state", 30)
 
     @property
@@ -124,6 +128,15 @@ class NodeProcess:
             self.process.kill()
         self.process.wait()
         shutil.rmtree(self.folder, ignore_errors=True)
+
+
+@pytest.fixture(autouse=True)
+def no_link_is_left() -> Iterator[None]:
+    """One that a failed test left open has threads that would keep the run from ending."""
+    yield
+    for remote in Remote.made:
+        remote.end.close()
+    Remote.made.clear()
 
 
 @pytest.fixture
@@ -390,10 +403,11 @@ def test_every_profile_jogs_and_stops_in_a_process_of_its_own(
         moved = 0.05 if description.drives else 0.02
 
         def has_moved() -> bool:
-            return bool(np.abs(np.array(remote.state.joints) - before).max() > moved)
+            state = remote.state
+            way = np.abs(np.array(state.joints) - before).max()
+            return state.mode == "moving" and bool(way > moved)
 
         remote.show(jog, 1, has_moved, "it moves")
-        assert remote.state.mode == "moving"
         tick = remote.state.tick
         remote.end.stop(StopRequest(source="test", reason="enough"))
         wait_for(lambda: remote.state.mode == "stopped", "S1")
