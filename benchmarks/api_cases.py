@@ -31,8 +31,15 @@ LEFT_OUT = "positive_data_acceptance,allow_header_conformance"
 PHASES = "examples,coverage,fuzzing,stateful"
 
 
-def cases(url: str, examples: int, seed: int) -> tuple[int, list[str], str]:
-    """Run them; gives how many there were, what was found, and the tool's words."""
+def cases(url: str, examples: int, seed: int, folder: Path) -> tuple[int, list[str], str]:
+    """Run them; gives how many there were, what was found, and the tool's words.
+
+    Args:
+        url: Of the server.
+        examples: At most this many a route.
+        seed: Of what is made up.
+        folder: Where the tool may leave what it keeps.
+    """
     done = subprocess.run(
         [
             str(Path(sys.executable).parent / "uv"), "tool", "run", "--from", TOOL,
@@ -42,8 +49,12 @@ def cases(url: str, examples: int, seed: int) -> tuple[int, list[str], str]:
             "--exclude-path-regex", "mjpeg", "--max-examples", str(examples),
             "--seed", str(seed), "--continue-on-failure", "--no-color",
         ],
-        cwd=ROOT,
-        env={**os.environ, "SCHEMATHESIS_HOOKS": "benchmarks.api_hooks"},
+        cwd=folder,
+        env={
+            **os.environ,
+            "PYTHONPATH": str(ROOT),
+            "SCHEMATHESIS_HOOKS": "benchmarks.api_hooks",
+        },
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
@@ -64,7 +75,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         server = start_server(Path(folder))
         try:
-            count, found, words = cases(server.url, options.examples, options.seed)
+            count, found, words = cases(server.url, options.examples, options.seed, Path(folder))
             log = server.log.read_text()
         finally:
             stop_server(server)

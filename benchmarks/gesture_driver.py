@@ -197,9 +197,11 @@ class GestureDriver:
         self._since = None
         began, start = self.clock.now(), _tool(self.eyes.now())
         rested = self.webcam.raise_hand(gesture)
-        while not self._lets_go(rested, enough, longest) and not self._leads(axis, gesture, start):
+        while not self._lets_go(rested, enough, longest) and not self._leads_astray(
+            axis, gesture, start
+        ):
             self.clock.sleep(0.01)
-        self.astray = self._leads(axis, gesture, start)
+        self.astray = self._leads_astray(axis, gesture, start)
         speed, driving = self._speed(), self.eyes.now().mode == "moving"
         seen = _tool(self.eyes.see())
         self.webcam.lower_hand(wait=False)
@@ -219,7 +221,7 @@ class GestureDriver:
             # The sign was not understood, or not all the time: show it a little differently.
             self.webcam.person = replace(self.webcam.person, seed=self.webcam.person.seed + 1)
 
-    def _leads(self, axis: int | None, gesture: str, start: F64) -> bool:
+    def _leads_astray(self, axis: int | None, gesture: str, start: F64) -> bool:
         """The robot is seen to go elsewhere than what was shown says."""
         moved = _tool(self.eyes.see()) - start
         if axis is not None:

@@ -108,11 +108,11 @@ Pairs = Sequence[tuple[str, bytes]]
 """Name and template (600 bytes) of every active sample."""
 
 
-def _quietly(done: int, total: int) -> None:
-    """Nobody asks how far it is."""
-
-
-def fit(templates: Pairs, settings: PipelineSettings, progress: Progress = _quietly) -> PcaMatcher:
+def fit(
+    templates: Pairs,
+    settings: PipelineSettings,
+    progress: Progress = lambda done, total: None,
+) -> PcaMatcher:
     """A matcher for these samples."""
     images = [unpack_template(template) for _, template in templates]
     stacked = np.stack(images) if images else np.zeros((0, 80, 60), np.uint8)
@@ -206,7 +206,7 @@ class LiveGallery:
                 self._forget_unused()
             return found
 
-    def prepare(self, pairs: Pairs, progress: Progress = _quietly) -> None:
+    def prepare(self, pairs: Pairs, progress: Progress) -> None:
         """Learn what a gallery is about to hold, so that :meth:`refresh` need not.
 
         Takes as long as fitting a matcher; not for the event loop. The newest is kept, until a

@@ -93,7 +93,8 @@ class PicturePace:
         self._raised_at = float("-inf")
         self._trying = False
         """The level was gone up to, not down."""
-        self._due = 0.0
+        self.due = 0.0
+        """When the next picture may be sent."""
         self._wanted_hz = FASTEST_HZ
         self._acknowledged = asyncio.Event()
 
@@ -102,18 +103,13 @@ class PicturePace:
         """Index in :data:`LEVELS`."""
         return self._level
 
-    @property
-    def due(self) -> float:
-        """When the next picture may be sent."""
-        return self._due
-
     async def turn(self) -> None:
         """Wait until the viewer may be sent the next picture."""
         loop = asyncio.get_running_loop()
         while len(self._under_way) >= LEVELS[self._level].under_way:
             self._acknowledged.clear()
             await self._acknowledged.wait()
-        await asyncio.sleep(max(0.0, self._due - loop.time()))
+        await asyncio.sleep(max(0.0, self.due - loop.time()))
 
     def sent(self, sequence: int, now: float) -> None:
         """A picture is on its way."""
@@ -121,7 +117,7 @@ class PicturePace:
         self._under_way[sequence] = now
         # Half an interval of grace: the camera's beat and ours do not agree.
         interval = 1 / min(LEVELS[self._level].rate_hz, self._wanted_hz)
-        self._due = max(self._due + interval, now + interval / 2)
+        self.due = max(self.due + interval, now + interval / 2)
 
     def acknowledge(self, shown: "Shown", now: float) -> None:
         """The viewer has shown this picture, and shows none that was sent before it any more."""

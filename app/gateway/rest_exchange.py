@@ -111,7 +111,7 @@ def _import(
     read = len(entries)
     there = hub.store.list(id)
     planned = plan_of(there, entries, existing)
-    if planned.entries:
+    if planned.entries and expected in (None, planned.digest):  # else it is refused below
         hub.gallery.prepare(
             planned.after(there),
             lambda done, total: job.progress(read + read * done // total, 3 * read),

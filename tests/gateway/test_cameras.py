@@ -156,7 +156,6 @@ def test_who_wants_fewer_pictures_gets_fewer(server: Running, node: StandIn) -> 
         StandInCamera(node, "wrist") as camera,
         server.socket("/ws/camera/wrist?acks=1") as viewer,
     ):
-        viewer.send(json.dumps({"type": "shown", "seq": 0, "most": 3}))  # of nothing: no answer
         message = viewer.recv(timeout=10)
         got, first = 0, camera.published
         while camera.published < first + 60:
