@@ -42,6 +42,8 @@ def test_a_gallery_is_looked_after(server: Server, open_page: OpenPage, tmp_path
     row(page, "up").get_by_role("button", name="pictures of").press("Enter")
     row(page, "up").locator(".sample").nth(1).press("Enter")
     row(page, "up").get_by_role("button", name="Delete picture 2").press("Enter")
+    # The page hears of it after the answer; else it would be taken for taken back already.
+    wait_for(page, f"{UP}.samples === {before['samples'] - 1}")
     page.locator("#notices #undo").press("Enter")
     wait_for(page, f"{UP}.samples === {before['samples']}")
     assert page.evaluate(UP)["sample_ids"] == before["sample_ids"]
