@@ -9,7 +9,11 @@ the stop must be latched: arming is refused until a reset.
 Every now and then, while it is stopped, gateway, node and cameras are killed (SIGKILL) and started
 again: the robot must still be stopped.
 
-    python -m benchmarks.estop [--runs 200] [--restarts 10] [--save FILE]
+With ``--siege`` everything else that could hold a stop up happens at the same time
+(:mod:`benchmarks.siege`): a log that is not read, a disk that freezes just before each stop, idle
+strangers, header floods, and uploads. Needs root.
+
+    python -m benchmarks.estop [--runs 200] [--restarts 10] [--siege] [--save FILE]
 """
 
 import argparse
@@ -33,6 +37,7 @@ from benchmarks.observer import tick_now, wait, wait_async
 from benchmarks.operator import Operator
 from benchmarks.report import arguments, percentiles, promise, report
 from benchmarks.rig import TOKEN, Rig, clip
+from benchmarks.siege import Disk, besiege, unread_pipe
 
 VIEWERS = 20
 P99_MS = 300.0
@@ -76,21 +81,21 @@ async def crowd(url: str) -> None:
 
 
 @contextmanager
-def crowded(url: str) -> Iterator[None]:
-    """The crowd is there."""
+def crowded(url: str, option: str = "--crowd") -> Iterator[None]:
+    """The crowd is there, or with ``--besiege`` those who attack."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "benchmarks.estop", "--crowd", url],
+        [sys.executable, "-m", "benchmarks.estop", option, url],
         stdout=subprocess.PIPE,
         text=True,
         cwd=Path(__file__).parents[1],
     )
     assert process.stdout is not None
     try:
-        if process.stdout.readline() != "floods\n":
-            raise RuntimeError("the crowd did not come")
+        if not process.stdout.readline():
+            raise RuntimeError(f"nobody came ({option})")
         yield
         if process.poll() is not None:
-            raise RuntimeError("the crowd left before the end")
+            raise RuntimeError(f"who came left before the end ({option})")
     finally:
         process.kill()
         process.wait()
@@ -105,8 +110,13 @@ class Outcome(NamedTuple):
     why_not: str = ""
 
 
-async def one_stop(rig: Rig, way: str) -> Outcome:
+async def one_stop(rig: Rig, way: str, disk: Disk | None = None) -> Outcome:
     """Drive at full speed, stop, and try to arm; leaves the robot stopped.
+
+    Args:
+        rig: The system.
+        way: Who stops, one of :data:`WAYS`.
+        disk: Frozen from just before the stop until it was measured.
 
     Raises:
         RuntimeError: the arm did not reach full speed, or did not come to rest at all.
@@ -131,17 +141,22 @@ async def one_stop(rig: Rig, way: str) -> Outcome:
             frames = itertools.islice(pictures.shown(), SHOWING)
             await driver.play(frames, until=observer.at_full_speed)
         showing = asyncio.create_task(driver.play(pictures.keep()))
-        stopped = tick_now()
-        match way:
-            case "driver":
-                await driver.say("stop")
-            case "watcher":
-                await watcher.say("stop")
-            case _:
-                (await api.post("/api/robots/puma/stop")).raise_for_status()
-        await asyncio.sleep(1.0)
-        stood = observer.standstill(stopped, tick_now())
-        refused = await _is_refused(driver)
+        with contextlib.ExitStack() as frozen:
+            if disk is not None:
+                await asyncio.to_thread(disk.freeze)
+                frozen.callback(disk.thaw)
+                await wait_async(observer.at_full_speed, "full speed on a frozen disk")
+            stopped = tick_now()
+            match way:
+                case "driver":
+                    await driver.say("stop")
+                case "watcher":
+                    await watcher.say("stop")
+                case _:
+                    (await api.post("/api/robots/puma/stop")).raise_for_status()
+            await asyncio.sleep(1.0)
+            stood = observer.standstill(stopped, tick_now())
+            refused = await _is_refused(driver)
         showing.cancel()
         with contextlib.suppress(asyncio.CancelledError, ConnectionClosed):
             await showing
@@ -189,20 +204,28 @@ def reset(rig: Rig) -> None:
         wait(lambda: api.post("/api/robots/puma/reset").status_code == 200, "a reset")
 
 
-def measure(runs: int, restarts: int) -> dict[str, dict[str, float | str]]:
+def measure(runs: int, restarts: int, *, siege: bool) -> dict[str, dict[str, float | str]]:
     """The rows of the report."""
     took: dict[str, list[float]] = {way: [] for way in WAYS}
     latched = 0
     survived = done = 0
     block = -(-runs // max(restarts, 1))
-    with tempfile.TemporaryDirectory() as folder, Rig(Path(folder)) as rig:
+    with contextlib.ExitStack() as around:
+        disk = around.enter_context(Disk()) if siege else None
+        stderr = around.enter_context(unread_pipe()) if siege else None
+        folder = around.enter_context(tempfile.TemporaryDirectory())
+        place = Path(folder) if disk is None else disk.folder
+        rig = around.enter_context(Rig(place, stderr=stderr))
         while done < runs:
-            with crowded(rig.url):
+            with contextlib.ExitStack() as crowd:
+                crowd.enter_context(crowded(rig.url))
+                if siege:
+                    crowd.enter_context(crowded(rig.url, "--besiege"))
                 for _ in range(min(block, runs - done)):
                     way = WAYS[done % len(WAYS)]
                     if done:
                         reset(rig)
-                    outcome = asyncio.run(one_stop(rig, way))
+                    outcome = asyncio.run(one_stop(rig, way, disk))
                     took[way].append(outcome.took_ms)
                     latched += outcome.latched
                     done += 1
@@ -236,11 +259,16 @@ def main() -> None:
     parser = arguments(__doc__, runs=200)
     parser.add_argument("--restarts", type=int, default=10, help="restarts of everything")
     parser.add_argument("--crowd", metavar="URL", help=argparse.SUPPRESS)
+    parser.add_argument("--siege", action="store_true", help="with everything that could delay it")
+    parser.add_argument("--besiege", metavar="URL", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.crowd:
         asyncio.run(crowd(options.crowd))
         return
-    report(measure(options.runs, options.restarts), options)
+    if options.besiege:
+        asyncio.run(besiege(options.besiege))
+        return
+    report(measure(options.runs, options.restarts, siege=options.siege), options)
 
 
 if __name__ == "__main__":

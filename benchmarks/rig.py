@@ -56,10 +56,12 @@ class Rig:
     Args:
         folder: For data and log; what is there stays in force over restarts.
         separate: The node runs by itself (``farhand robot``), not as the gateway's child.
+        stderr: File descriptor for the server's log; a file in ``folder`` unless given.
     """
 
-    def __init__(self, folder: Path, *, separate: bool = False) -> None:
+    def __init__(self, folder: Path, *, separate: bool = False, stderr: int | None = None) -> None:
         self._folder = folder
+        self._stderr = stderr
         self._node = BenchNode(cameras=True) if separate else None
         try:
             self.server = self._start_server()
@@ -123,8 +125,10 @@ class Rig:
 
     def _start_server(self) -> Server:
         if self._node is None:
-            return start_server(self._folder)
-        return start_server(self._folder, "--robot-endpoint", self._node.endpoint)
+            return start_server(self._folder, stderr=self._stderr)
+        return start_server(
+            self._folder, "--robot-endpoint", self._node.endpoint, stderr=self._stderr
+        )
 
     def _observe(self) -> Observer:
         return Observer(self.server.endpoint() if self._node is None else self._node.endpoint)

@@ -66,18 +66,22 @@ class Server:
 
 
 def start_server(
-    folder: Path, *options: str, cwd: Path = ROOT, env: dict[str, str] | None = None
+    folder: Path,
+    *options: str,
+    cwd: Path = ROOT,
+    env: dict[str, str] | None = None,
+    stderr: int | None = None,
 ) -> Server:
-    """Start a server on a free port and wait for its link."""
+    """Start a server on a free port and wait for its link; it logs to ``stderr``, if given."""
     log = folder / "server.log"
-    with log.open("a") as stderr:
+    with log.open("a") as file:
         process = subprocess.Popen(
             [
                 sys.executable, "-m", "app", "serve", "--port", "0",
                 "--data-dir", str(folder / "data"), "--token", TOKEN, *options,
             ],
             stdout=subprocess.PIPE,
-            stderr=stderr,
+            stderr=file if stderr is None else stderr,
             text=True,
             cwd=cwd,
             env=env,
