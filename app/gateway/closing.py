@@ -1,6 +1,7 @@
 """Why a session ends before the browser goes."""
 
 CLOSE_BAD = 1007
+CLOSE_NOT_ALLOWED = 1008
 CLOSE_TOO_BIG = 1009
 CLOSE_TOO_SLOW = 1013
 CLOSE_INTERNAL = 1011

@@ -56,7 +56,7 @@ ROUTES: dict[str, Access] = {
     "WEBSOCKET /ws/camera/{name}": "signed in",
     "WEBSOCKET /ws/operator": "signed in",  # what may be sent there: MESSAGES
     "GET /viser": "signed in",
-    "GET /viser/{path:path}": "signed in",
+    "GET /viser/": "signed in",
     "WEBSOCKET /viser": "signed in",
     "WEBSOCKET /viser/": "signed in",
     # Driving and teaching

@@ -1,14 +1,15 @@
 """The live 3D view: the arm from its own URDF, the things around it, moved by the robot's states.
 
 A thread loads viser (which takes seconds, and nobody waits for it), follows the robot and updates
-the scene only while somebody looks. viser's own server runs in a further thread; a failure in
-either shows in the log and stops nothing else.
+the scene only while somebody looks. viser's own server (:mod:`app.gateway.viser_server`) runs in a
+further thread; a failure in either shows in the log and stops nothing else.
 """
 
 import logging
 import threading
 import time
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     import viser
     from viser.extras import ViserUrdf
 
+    from app.gateway.viser_server import Page, PrivateServer
     from app.robot.models import Model, ModelAssets
 
 log = logging.getLogger(__name__)
@@ -44,7 +46,7 @@ DETAIL_M = 0.002
 
 
 class ViserScene:
-    """One robot in 3D, served on a free port of the loopback interface.
+    """One robot in 3D, served on a private unix socket.
 
     Args:
         robot: Whose states to follow.
@@ -55,7 +57,11 @@ class ViserScene:
     def __init__(self, robot: RobotPort, profile: str | None = None) -> None:
         self._robot = robot
         self._profile = profile
-        self._server: viser.ViserServer | None = None
+        self._server: PrivateServer | None = None
+        self.page: Page | None = None
+        """viser's page; None before the server is started."""
+        self.failure: str | None = None
+        """Why there is no 3D view, and will be none."""
         self._ready = threading.Event()
         self._ending = threading.Event()
         self._described: Description | None = None
@@ -75,15 +81,13 @@ class ViserScene:
         self._thread = threading.Thread(target=self._run, name="viser-scene", daemon=True)
         self._thread.start()
 
-    def wait_port(self, timeout_s: float) -> int | None:
-        """Wait for viser to be there: its port, or None when it takes too long. Blocks."""
-        if not self._ready.wait(timeout_s) or self._server is None:
-            return None
-        port: int = self._server.get_port()
-        return port
+    def wait_socket(self, timeout_s: float) -> Path | None:
+        """Wait for viser to be there: its socket, or None when there is none in time. Blocks."""
+        self._ready.wait(timeout_s)
+        return None if self._server is None or self._ending.is_set() else self._server.path
 
     @property
-    def server(self) -> "viser.ViserServer | None":
+    def server(self) -> "PrivateServer | None":
         """The server of viser; None before it is started."""
         return self._server
 
@@ -123,12 +127,14 @@ class ViserScene:
 
     def _start(self) -> None:
         import rich
-        import viser
+
+        from app.gateway.viser_server import Page, PrivateServer
 
         # viser prints by rich's console. Standard output is for our link alone, and may be written
         # at this very moment: so not redirected.
         rich.reconfigure(quiet=True)
-        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        self.page = Page()
+        server = PrivateServer()
         # What does not depend on the robot: ground, the first view, no panels.
         server.gui.configure_theme(show_logo=False, show_share_button=False)
         server.gui.main_panel.minimize()
@@ -149,6 +155,11 @@ class ViserScene:
                     self._start()
                     self._ready.set()
                 self._follow()
+            except CannotStart as error:
+                log.error("there is no 3D view: %s", error.message)
+                self.failure = error.message
+                self._ready.set()
+                return
             except Exception:
                 log.exception("the 3D view could not be updated")
                 self._ending.wait(RETRY_S)

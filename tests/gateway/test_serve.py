@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import getpass
 import io
 import os
 import re
@@ -10,6 +11,7 @@ import signal
 import socket
 import sqlite3
 import ssl
+import stat
 import subprocess
 import sys
 import time
@@ -18,18 +20,22 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import httpx
+import msgspec
 import psutil
 import pytest
+import viser
 from pydantic import SecretStr, ValidationError
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
 
 from app.config import Settings
 from app.errors import CannotStart
-from app.gateway.auth import is_loopback
 from app.gateway.greeting import address, greet, link
 from app.gateway.serve import bind
 from app.gateway.tls import FOLDER, read_authority
 from app.gateway.tokens import TokenStore
 from app.gateway.transport import check_transport, keep_certificate, local_authority
+from benchmarks.scene_cost import CAMERA
 from tests.gateway.running import TOKEN, StandIn, running, settings_for, wait_for
 
 SCRIPT = """
@@ -220,8 +226,11 @@ def test_off_loopback_a_certificate_is_made(folder: Path, node: StandIn) -> None
     assert read_authority(data / FOLDER) == authority
 
 
-def test_only_the_own_port_is_reached_from_outside(folder: Path) -> None:
-    """Node, camera process and viser listen on loopback or on files alone."""
+def test_the_server_and_all_it_starts_listen_on_one_port(folder: Path) -> None:
+    """Node, camera process and 3D view listen on files alone, in folders that are ours alone.
+
+    And none of them outlives the server, even if that is killed.
+    """
     with program(folder / "data", host="0.0.0.0") as process:
         url, token = read_link(process)
         port = int(url.rpartition(":")[2])
@@ -236,21 +245,43 @@ def test_only_the_own_port_is_reached_from_outside(folder: Path) -> None:
                 wait_for(
                     lambda path=path: client.get(f"{here}/{path}").status_code == 200, path, 60
                 )
-            family = [psutil.Process(process.pid)]
-            family += family[0].children(recursive=True)
-            assert len(family) >= 3
-            listening = [
-                connection.laddr
-                for each in family
-                for connection in each.net_connections(kind="inet")
-                if connection.status == psutil.CONN_LISTEN or connection.type == socket.SOCK_DGRAM
-            ]
-    loopback = [address for address in listening if is_loopback(address.ip)]
-    assert [(address.ip, address.port) for address in listening if address not in loopback] == [
-        ("0.0.0.0", port)
-    ]
-    # viser's, which the test would have seen anywhere else.
-    assert len(loopback) == 1
+            protocol = [Subprotocol(f"viser-v{viser.__version__}")]
+            with connect(
+                f"wss://localhost:{port}/viser",
+                ssl=trust,
+                additional_headers=bearer,
+                subprotocols=protocol,
+                proxy=None,
+                max_size=None,
+            ) as look:
+                look.send(msgspec.msgpack.encode(CAMERA))
+                assert look.recv(timeout=20)
+                family = [psutil.Process(process.pid)]
+                family += family[0].children(recursive=True)
+                assert len(family) >= 3
+                ports = [
+                    connection.laddr
+                    for each in family
+                    for connection in each.net_connections(kind="inet")
+                    if connection.status == psutil.CONN_LISTEN
+                    or connection.type == socket.SOCK_DGRAM
+                ]
+                files = {
+                    Path(connection.laddr)
+                    for each in family
+                    for connection in each.net_connections(kind="unix")
+                    if connection.laddr
+                }
+        assert [(address.ip, address.port) for address in ports] == [("0.0.0.0", port)]
+        assert {path.name for path in files} == {"link", "viser"}
+        for path in files:
+            assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
+            assert path.parent.owner() == getpass.getuser()
+        process.kill()
+        _, alive = psutil.wait_procs(family, timeout=30)
+        assert not alive
+        for path in files:  # a kill leaves them behind
+            shutil.rmtree(path.parent)
 
 
 def test_a_certificate_is_made_only_where_none_is_given(tmp_path: Path) -> None:

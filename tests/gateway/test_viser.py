@@ -3,16 +3,20 @@
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
-import httpx
 import msgspec
 import numpy as np
+import psutil
 import pytest
 import viser
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
 
+from app.gateway.pace import Pace
+from app.gateway.tokens import TokenStore
 from app.gateway.viser_aids import box_edges, label_of
+from app.gateway.viser_messages import BURST, MAX_HZ
 from app.gateway.viser_rehearsal import view_of
 from app.gateway.viser_scene import ViserScene
 from app.link.messages import DryRunPath, DryRunProblem, DryRunReport
@@ -26,8 +30,13 @@ from tests.gateway.running import (
     settings_for,
     wait_for,
 )
+from tests.gateway.viser_types import every_message
 
 PROTOCOL = f"viser-v{viser.__version__}"
+PATHS_THAT_ARE_NOT = (
+    "index.html", "nothing.js", "%00", "%2F", "/", "%2e%2e/", "..%2f..%2f_viser.py", "%5c..%5c",
+    "%0d%0aX-Evil:%201", "%ff", "a" * 5000, "%3Fx", "viser/",
+)  # fmt: skip
 
 
 @pytest.fixture
@@ -46,8 +55,6 @@ def test_the_view_is_served_through_the_gateway(with_viser: Running, node: Stand
     assert "frame-ancestors 'self'" in policy
     assert "http" not in policy
     assert server.http.get("/viser").headers["location"] == "/viser/"
-    missing = server.http.get("/viser/nothing.js")
-    assert missing.status_code == 404
 
     scene = server.hub.viser
     assert scene is not None
@@ -61,10 +68,152 @@ def test_the_view_is_served_through_the_gateway(with_viser: Running, node: Stand
         while size < 20_000:
             size += len(socket.recv(timeout=20))
 
-    # viser itself listens on loopback alone.
-    port = scene.wait_port(1)
-    assert port is not None
-    assert httpx.get(f"http://127.0.0.1:{port}/", trust_env=False).status_code == 200
+
+def test_nothing_but_the_page_is_served(with_viser: Running) -> None:
+    for path in PATHS_THAT_ARE_NOT:
+        answer = with_viser.http.get(f"/viser/{path}")
+        assert answer.status_code == 404, path
+        assert answer.json()["error"]["code"] == "not_found"
+
+
+def test_the_page_is_sent_as_it_is_whatever_is_asked(with_viser: Running) -> None:
+    plain = with_viser.http.get("/viser/", headers={"Accept-Encoding": "identity"})
+    packed = with_viser.http.get("/viser/?a=b&websocket=wss://evil.example/#c")
+    assert packed.headers["content-encoding"] == "gzip"
+    assert plain.content == packed.content
+    assert set(plain.headers) - set(with_viser.http.get("/nothing").headers) == {"vary"}
+    assert "connect-src 'self'" in packed.headers["content-security-policy"]
+    assert with_viser.http.post("/viser/").status_code == 405
+
+
+# What a browser may send
+
+
+class Connects:
+    """Sees which addresses this process asks for or connects to; a hook of Python's stays."""
+
+    def __init__(self) -> None:
+        self.seen: list[str] | None = None
+        sys.addaudithook(self._hook)
+
+    def _hook(self, event: str, arguments: tuple[Any, ...]) -> None:
+        if self.seen is None:
+            return
+        if event == "socket.connect" and isinstance(arguments[1], tuple):
+            self.seen.append(str(arguments[1][0]))
+        elif event == "socket.getaddrinfo":
+            self.seen.append(str(arguments[0]))
+
+
+connects = Connects()
+
+
+def closed_with(socket: ClientConnection) -> int:
+    """Read to the end: the code that the server closes with."""
+    with pytest.raises(ConnectionClosed) as closed:
+        while True:
+            socket.recv(timeout=20)
+    assert closed.value.rcvd is not None
+    return closed.value.rcvd.code
+
+
+def test_of_every_message_that_viser_knows_one_arrives(with_viser: Running) -> None:
+    """Whoever may look may not upload, draw, press, or have the scene shown to the internet."""
+    with_viser.http.get("/viser/")
+    scene = with_viser.hub.viser
+    assert scene is not None and scene.server is not None
+    arrived: list[str] = []
+    inner = scene.server._websock_server
+    handle = inner._handle_incoming_message
+
+    async def handle_incoming(client: Any, message: Any) -> None:
+        arrived.append(type(message).__name__)
+        await handle(client, message)
+
+    inner._handle_incoming_message = handle_incoming  # type: ignore[method-assign]
+    processes = psutil.Process().children(recursive=True)
+    codes = {}
+    connects.seen = []
+    try:
+        for name, message in every_message().items():
+            with with_viser.socket("/viser", subprotocols=[PROTOCOL]) as socket:
+                socket.send(message)
+                if name == "ViewerCameraMessage":
+                    wait_for(lambda: arrived, "the camera to arrive")
+                else:
+                    codes[name] = closed_with(socket)
+        told = connects.seen
+    finally:
+        connects.seen = None
+    assert arrived == ["ViewerCameraMessage"]
+    assert len(codes) > 100
+    assert set(codes.values()) == {1008}
+    assert set(told) <= {"127.0.0.1"}
+    assert psutil.Process().children(recursive=True) == processes
+    text = with_viser.http.get("/metrics").text
+    assert f'farhand_bad_messages_total{{code="viewer_message"}} {len(codes):.1f}' in text
+
+
+@pytest.mark.parametrize(
+    ("message", "code"),
+    [
+        ("ViewerCameraMessage", 1008),
+        (b"", 1008),
+        (b"\xdf\xff\xff\xff\xff", 1008),
+        (bytes(2000), 1009),
+        (bytes(5 << 20), 1009),
+    ],
+    ids=["text", "empty", "map of four billion", "long", "very long"],
+)
+def test_a_viewer_that_sends_something_else_is_turned_away(
+    with_viser: Running, message: str | bytes, code: int
+) -> None:
+    with_viser.http.get("/viser/")
+    with with_viser.socket("/viser", subprotocols=[PROTOCOL]) as socket:
+        socket.send(message)
+        assert closed_with(socket) == code
+    # Nobody else notices.
+    with with_viser.socket("/viser", subprotocols=[PROTOCOL]) as socket:
+        assert socket.recv(timeout=20)
+
+
+def test_what_a_viewer_says_again_and_again_is_slowed(
+    with_viser: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    waits: list[float] = []
+
+    class Slow(Pace):
+        def wait_s(self, now: float) -> float:
+            waits.append(super().wait_s(0.0))  # no time passes
+            return min(waits[-1], 0.001)
+
+    monkeypatch.setattr("app.gateway.viser_proxy.Pace", Slow)
+    with_viser.http.get("/viser/")
+    with with_viser.socket("/viser", subprotocols=[PROTOCOL]) as socket:
+        for _ in range(BURST + 50):
+            socket.send(msgspec.msgpack.encode(CAMERA))
+        wait_for(lambda: len(waits) == BURST + 50, "all to be read")
+    assert set(waits[:BURST]) == {0.0}
+    assert waits[-1] == pytest.approx(50 / MAX_HZ)
+
+
+def test_what_a_viewer_sees_ends_with_its_token(with_viser: Running) -> None:
+    with_viser.http.get("/viser/")
+    scene = with_viser.hub.viser
+    assert scene is not None and scene.server is not None
+    tokens = TokenStore(with_viser.hub.settings.data_dir / "tokens.json")
+    made = tokens.make("observer", "tablet")
+    bearer = {"Authorization": f"Bearer {made.secret}"}
+    server = scene.server
+    with with_viser.socket("/viser", subprotocols=[PROTOCOL], additional_headers=bearer) as socket:
+        socket.send(msgspec.msgpack.encode(CAMERA))
+        wait_for(server.get_clients, "an observer to look")
+        tokens.revoke(made.token.id)
+        assert closed_with(socket) == 1008
+    wait_for(lambda: not server.get_clients(), "viser's own end to close")
+    with pytest.raises(InvalidStatus) as refused:
+        with_viser.socket("/viser", subprotocols=[PROTOCOL], additional_headers=bearer)
+    assert refused.value.response.status_code == 401
 
 
 def test_a_client_of_another_version_is_closed_as_viser_says(with_viser: Running) -> None:
@@ -84,7 +233,7 @@ def test_standard_output_is_left_to_the_link(
     out = sys.stdout
     scene = ViserScene(server.hub.robot, None)
     try:
-        while scene.wait_port(0.001) is None:
+        while scene.wait_socket(0.001) is None:
             # Redirecting it would swallow what another thread prints now.
             assert sys.stdout is out
     finally:

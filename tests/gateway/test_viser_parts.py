@@ -22,6 +22,7 @@ from app.gateway.viser_rehearsal import (
     marks_of,
     way_of,
 )
+from app.gateway.viser_server import PrivateServer
 from app.gateway.viser_trail import LASTS_S, MOST_POINTS, NEW, OLD, Trail, fading
 from app.link.header import FrameHeader
 from app.link.messages import DryRunPath, DryRunProblem, DryRunReport
@@ -31,7 +32,7 @@ from app.robot.models.meshes import drawn_urdf
 
 @pytest.fixture(scope="module")
 def scene() -> Iterator[viser.ViserServer]:
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    server = PrivateServer()
     yield server
     server.stop()
 
