@@ -2,6 +2,8 @@
 
 import asyncio
 import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,8 +11,12 @@ import httpx
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
+from app.link.actions import JogJoint
+from app.link.messages import LeaseRequest, StopRequest
+from app.link.session import socket_endpoint
 from benchmarks import estop
-from benchmarks.observer import wait
+from benchmarks.node_process import Driver
+from benchmarks.observer import FULL_SPEED, STANDSTILL_MS, Observer, tick_now, wait
 from benchmarks.rig import Rig
 from tests.unread import PipeReader, Reader, TerminalReader
 
@@ -69,3 +75,38 @@ def test_a_server_ends_in_order_though_nobody_reads_its_log(reader: Reader, tmp_
         rig.server.process.terminate()
         assert rig.server.process.wait(30) == 0
         assert not node.is_running()
+
+
+def test_a_node_that_runs_by_itself(reader: Reader, tmp_path: Path) -> None:
+    endpoint = socket_endpoint(tmp_path / "link" / "n")
+    latch = tmp_path / "latch"
+    command = [sys.executable, "-m", "app", "robot", "--endpoint", endpoint, "--latch", str(latch)]
+    node = subprocess.Popen(command, stdout=reader.handle, stderr=reader.handle)
+    try:
+        with Observer(endpoint) as observer:
+            driver = Driver(endpoint, "anna")
+            reader.stop()
+            driver.ready()
+            driver.show(JogJoint(joint=1, velocity=FULL_SPEED), 1, observer.at_full_speed)
+            pressed = tick_now()
+            driver.end.stop(StopRequest(source="test"))
+            wait(lambda: observer.state.mode == "stopped" and observer.stands(), "the stop")
+            stood = observer.standstill(pressed, tick_now())
+            assert stood.since_fault_ms <= 2 * STANDSTILL_MS
+            wait(latch.exists, "the latch")
+
+            def lost() -> int:
+                loop = observer.state.loop
+                return 0 if loop is None else loop.log_lines_dropped
+
+            while not lost():
+                assert not driver.end.ask(LeaseRequest(kind="reset_scene", holder="x"), 5).granted
+            reader.go_on()
+            wait(lambda: "were dropped" in reader.text, "the count")
+            driver.end.close()
+        node.terminate()
+        assert node.wait(30) == 0
+        assert "INFO ending: asked to end" in reader.text
+    finally:
+        node.kill()
+        node.wait()
