@@ -113,10 +113,13 @@ def robot(
     ] = None,
 ) -> None:
     """Start a robot node by itself, for a gateway that runs elsewhere."""
+    from app import logs
     from app.config import NodeSettings
     from app.robot.node import run_node
 
-    run_node(NodeSettings(id=id, profile=profile, endpoint=endpoint, latch=latch))
+    settings = NodeSettings(id=id, profile=profile, endpoint=endpoint, latch=latch)
+    with logs.written_apart():
+        run_node(settings)
 
 
 @app.command()

@@ -269,3 +269,5 @@ class Hub:
                 yield "farhand_node_loop_hertz", "Rate of the control loop", state.loop.rate_hz
                 late = state.loop.late_max_ms / 1000
                 yield "farhand_node_loop_late_seconds", "Worst lateness, last second", late
+                lost = float(state.loop.log_lines_dropped)
+                yield "farhand_node_log_lines_dropped", "Log lines the node dropped", lost

@@ -10,8 +10,10 @@ from prometheus_client import (
     ProcessCollector,
     generate_latest,
 )
-from prometheus_client.core import GaugeMetricFamily, Metric
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
+
+from app import logs
 
 _STAGE_BUCKETS = (0.0002, 0.0005, 0.001, 0.002, 0.004, 0.006, 0.01, 0.02, 0.05, 0.1, 0.5)
 
@@ -29,6 +31,15 @@ class _Live(Collector):
                 yield GaugeMetricFamily(name, text, value=value)
 
 
+class _LogLines(Collector):
+    """What nobody read of the log."""
+
+    def collect(self) -> Iterable[Metric]:
+        """The one counter."""
+        text = "Lines of the gateway's log dropped because nobody read them in time"
+        yield CounterMetricFamily("farhand_log_lines_dropped", text, value=logs.dropped())
+
+
 class Metrics:
     """The gateway's counters. Safe to use from any thread."""
 
@@ -36,6 +47,7 @@ class Metrics:
         self._registry = CollectorRegistry()
         ProcessCollector(registry=self._registry)
         PlatformCollector(registry=self._registry)
+        self._registry.register(_LogLines())
         registry = self._registry
         self.frames = Counter(
             "farhand_frames", "Webcam frames by what became of them", ["outcome"], registry=registry

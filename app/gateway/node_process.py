@@ -16,6 +16,8 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from app import logs
+
 log = logging.getLogger(__name__)
 
 BACK_OFF_S = (0.2, 0.5, 1.0, 2.0, 5.0)
@@ -129,7 +131,9 @@ class NodeProcess:
             self._process = subprocess.Popen(
                 self._command,
                 stdin=subprocess.DEVNULL,
-                stdout=2,  # standard output is for the link that `farhand serve` prints
+                # Standard output is for the link that `farhand serve` prints.
+                stdout=logs.standard_error(),
+                stderr=logs.standard_error(),
                 env=node_environment(),
                 start_new_session=True,
             )

@@ -5,19 +5,18 @@ import contextlib
 import errno
 import gc
 import logging
-import logging.config
 import signal
 import socket
 import sys
 from collections.abc import Callable, Iterator
 from types import FrameType
-from typing import Any
 
 import cv2
 import uvicorn
 import uvloop
 from fastapi import FastAPI
 
+from app import logs
 from app.config import Settings
 from app.errors import CannotStart
 from app.gateway.app import create_app
@@ -37,26 +36,14 @@ closing while the rest of it arrives would reset the connection and lose the cod
 GRACE_S = 1
 UNSENT_BYTES = 128 * 1024
 
-LOG_CONFIG: dict[str, Any] = {
-    "version": 1,
-    "disable_existing_loggers": False,
-    "formatters": {"line": {"format": "%(asctime)s %(levelname)s %(message)s"}},
-    "handlers": {
-        "stderr": {
-            "class": "logging.StreamHandler",
-            "formatter": "line",
-            "stream": "ext://sys.stderr",
-        }
-    },
-    "loggers": {
-        # uvicorn's own lines carry query strings, in which a token may stand; the guard logs.
-        "uvicorn": {"level": "WARNING", "handlers": ["stderr"], "propagate": False},
-        "uvicorn.access": {"level": "CRITICAL", "propagate": False},
-        "websockets": {"level": "WARNING"},
-        "httpx": {"level": "WARNING"},
-        "httpcore": {"level": "WARNING"},
-        "alembic": {"level": "WARNING"},
-    },
+LOG_LEVELS = {
+    # uvicorn's own lines carry query strings, in which a token may stand; the guard logs.
+    "uvicorn": logging.WARNING,
+    "uvicorn.access": logging.CRITICAL,
+    "websockets": logging.WARNING,
+    "httpx": logging.WARNING,
+    "httpcore": logging.WARNING,
+    "alembic": logging.WARNING,
 }
 
 
@@ -211,7 +198,8 @@ async def _run(
             keeping = asyncio.create_task(keep_certificate(server.config.ssl, settings, authority))
         # What is loaded now stays: collections during the work need not look at it.
         gc.freeze()
-        told()
+        # What it keeps is written to disk.
+        await asyncio.to_thread(told)
         try:
             await server.serve(sockets=[listener])
         finally:
@@ -230,9 +218,15 @@ def serve(settings: Settings) -> None:
         CannotStart: the port, the data folder, the page or the certificate.
         DatabaseBroken: the gesture database cannot be read.
     """
-    logging.config.dictConfig(LOG_CONFIG)
+    for name, level in LOG_LEVELS.items():
+        logging.getLogger(name).setLevel(level)
     # Two frames at once are better than one frame on two cores.
     cv2.setNumThreads(1)
+    with logs.written_apart():
+        _serve(settings)
+
+
+def _serve(settings: Settings) -> None:
     check_transport(settings)
     signals = Signals()
     with bind(settings) as listener, signals.caught():

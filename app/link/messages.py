@@ -150,6 +150,9 @@ class LoopState(Message):
     late: int = Field(
         default=0, ge=0, description="of these began more than 5 ms after their time, or never"
     )
+    log_lines_dropped: int = Field(
+        default=0, ge=0, description="by the node, which waits for nobody who reads its log"
+    )
 
 
 class State(Message):

@@ -20,6 +20,7 @@ import simplejpeg
 import zenoh
 from pydantic import ValidationError
 
+from app import logs
 from app.errors import FarhandError, WorldError
 from app.link.header import FrameHeader
 from app.link.messages import State, key
@@ -148,9 +149,11 @@ def main(arguments: list[str] | None = None) -> int:
         help="auto takes a graphics card where there is one",
     )
     options = parser.parse_args(arguments)
-    logging.basicConfig(
-        level=logging.INFO, format="%(asctime)s camera %(levelname)s %(message)s", force=True
-    )
+    with logs.written_apart("%(asctime)s camera %(levelname)s %(message)s"):
+        return _run(options)
+
+
+def _run(options: argparse.Namespace) -> int:
     parent = os.getppid()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     # A Ctrl-C in the terminal is the node's business, which ends this process in its own time.

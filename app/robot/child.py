@@ -6,6 +6,8 @@ import subprocess
 import threading
 from collections.abc import Sequence
 
+from app import logs
+
 log = logging.getLogger(__name__)
 
 _CHECK_S = 0.5
@@ -45,7 +47,12 @@ class Child:
         pause = _FIRST_PAUSE_S
         while not self._closing.is_set():
             try:
-                self._process = subprocess.Popen(self._command, stdin=subprocess.DEVNULL)
+                self._process = subprocess.Popen(
+                    self._command,
+                    stdin=subprocess.DEVNULL,
+                    stdout=logs.standard_error(),
+                    stderr=logs.standard_error(),
+                )
             except OSError as error:
                 log.error("the %s cannot be started: %s", self._name, error)
                 self._closing.wait(pause)

@@ -17,6 +17,7 @@ import numpy as np
 import zenoh
 from pydantic import ValidationError
 
+from app import logs
 from app.config import ArmMotionSettings
 from app.errors import FarhandError
 from app.link.messages import DryRunReport, DryRunRequest, State, key
@@ -161,9 +162,11 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--profile", default="puma560", help="name or file of the robot's profile")
     parser.add_argument("--motion", default="{}", help="JSON of how the robot moves its arm")
     options = parser.parse_args(arguments)
-    logging.basicConfig(
-        level=logging.INFO, format="%(asctime)s dry run %(levelname)s %(message)s", force=True
-    )
+    with logs.written_apart("%(asctime)s dry run %(levelname)s %(message)s"):
+        return _run(options)
+
+
+def _run(options: argparse.Namespace) -> int:
     parent = os.getppid()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     # A Ctrl-C in the terminal reaches the whole group; the node ends this process in its own time.

@@ -6,6 +6,7 @@ import os
 import time
 from collections import deque
 
+from app import logs
 from app.link.messages import LoopState
 
 log = logging.getLogger(__name__)
@@ -75,6 +76,7 @@ class LoopClock:
             late_max_ms=round(max(0.0, worst) * 1000, 2),
             cycles=self._cycles + self._let_go,
             late=self._late,
+            log_lines_dropped=logs.dropped(),
         )
 
 

@@ -18,6 +18,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from app import logs
 from app.config import NodeSettings
 from app.errors import FarhandError
 from app.link.messages import StopRequest
@@ -30,6 +31,8 @@ from app.robot.loop_clock import LoopClock, keep_time
 
 log = logging.getLogger(__name__)
 
+LINE = "%(asctime)s %(levelname)s node %(name)s: %(message)s"
+"""How a line of the log looks."""
 STATE_EVERY = 4
 """Cycles between two states: 60 a second."""
 _PARENT_EVERY = 24
@@ -189,27 +192,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--parent", type=int, help="process id of the one that starts it; end when that is gone"
     )
     given = parser.parse_args(arguments)
-    logging.basicConfig(
-        level=logging.INFO, format="%(asctime)s %(levelname)s node %(name)s: %(message)s"
-    )
-    try:
-        settings = NodeSettings(
-            id=given.id,
-            profile=given.profile,
-            endpoint=given.endpoint,
-            latch=given.latch,
-            cameras=not given.no_cameras,
-            dry_runs=not given.no_dry_runs,
-            parent=given.parent,
-        )
-        run_node(settings)
-    except ValidationError as error:
-        first = error.errors()[0]
-        print(f"{first['loc'][0]}: {first['msg']}, not {first['input']!r}", file=sys.stderr)
-        return 1
-    except FarhandError as error:
-        print(error.message, file=sys.stderr)
-        return 1
+    with logs.written_apart(LINE):
+        try:
+            settings = NodeSettings(
+                id=given.id,
+                profile=given.profile,
+                endpoint=given.endpoint,
+                latch=given.latch,
+                cameras=not given.no_cameras,
+                dry_runs=not given.no_dry_runs,
+                parent=given.parent,
+            )
+            run_node(settings)
+        except ValidationError as error:
+            first = error.errors()[0]
+            print(f"{first['loc'][0]}: {first['msg']}, not {first['input']!r}", file=sys.stderr)
+            return 1
+        except FarhandError as error:
+            print(error.message, file=sys.stderr)
+            return 1
     return 0
 
 

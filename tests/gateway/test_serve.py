@@ -35,8 +35,10 @@ from app.gateway.serve import bind
 from app.gateway.tls import FOLDER, read_authority
 from app.gateway.tokens import TokenStore
 from app.gateway.transport import check_transport, keep_certificate, local_authority
+from benchmarks.node_process import free_port
 from benchmarks.scene_cost import CAMERA
 from tests.gateway.running import TOKEN, StandIn, running, settings_for, wait_for
+from tests.unread import PipeReader
 
 SCRIPT = """
 import sys
@@ -114,6 +116,38 @@ def test_it_prints_one_link_and_ends_quickly(
         assert out == ""
         assert "Traceback" not in err
         assert token not in err
+
+
+def test_it_serves_though_nobody_takes_its_link(folder: Path, node: StandIn) -> None:
+    port = str(free_port())
+    with PipeReader() as out:
+        out.stop()
+        command = [sys.executable, "-c", SCRIPT, "127.0.0.1", port, str(folder / "data")]
+        process = subprocess.Popen(
+            [*command, node.endpoint, "-", "-"],
+            stdout=out.handle,
+            stderr=subprocess.DEVNULL,
+            cwd=ROOT,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+        )
+        try:
+            with httpx.Client(base_url=f"http://127.0.0.1:{port}", trust_env=False) as client:
+                wait_for(lambda: reached(client), "the server", 60)
+            out.go_on()
+            wait_for(lambda: "?token=" in out.text, "the link")
+            process.terminate()
+            assert process.wait(30) == 0
+        finally:
+            process.kill()
+            process.wait()
+    assert re.fullmatch(r"http://\S+/\?token=\S+\n", out.text.lstrip("\n"))
+
+
+def reached(client: httpx.Client) -> bool:
+    try:
+        return client.get("/api/health").status_code == 200
+    except httpx.ConnectError:
+        return False
 
 
 def test_nothing_is_left_behind_when_it_ends(folder: Path) -> None:
