@@ -28,6 +28,8 @@ PAUSED_S = 0.5
 may not have read yet what the node said meanwhile."""
 STOP_WAIT_S = 1.5
 """After asking the node to end, and before killing it."""
+KILL_WAIT_S = 3.0
+"""One that waits inside the kernel, for a frozen disk, ends only when the disk answers."""
 _SECRETS = ("FARHAND_TOKEN",)
 
 
@@ -56,6 +58,7 @@ class NodeProcess:
         last_word: ``time.monotonic()`` of the newest state from the robot, or None.
         hung_s: No state for this long: killed and started again.
         start_s: Time from the start to the first state.
+        more: What to add to the command, asked at every start.
     """
 
     def __init__(
@@ -65,8 +68,10 @@ class NodeProcess:
         last_word: Callable[[], float | None],
         hung_s: float,
         start_s: float,
+        more: Callable[[], Sequence[str]] = lambda: (),
     ) -> None:
         self._command = list(command)
+        self._more = more
         self._last_word = last_word
         self._hung_s = hung_s
         self._start_s = start_s
@@ -127,7 +132,7 @@ class NodeProcess:
     def _spawn(self) -> None:
         try:
             self._process = subprocess.Popen(
-                self._command,
+                [*self._command, *self._more()],
                 stdin=subprocess.DEVNULL,
                 stdout=2,  # standard output is for the link that `farhand serve` prints
                 env=node_environment(),
@@ -169,7 +174,10 @@ class NodeProcess:
     def _kill(self) -> None:
         self._signal(signal.SIGKILL)
         if self._process is not None:
-            self._process.wait()
+            try:
+                self._process.wait(KILL_WAIT_S)
+            except subprocess.TimeoutExpired:
+                log.error("the robot node was killed, but does not end: it waits for a disk")
 
     def _end(self) -> None:
         process = self._process

@@ -5,6 +5,7 @@ import time
 from typing import Any
 
 from app.gateway.drive import Lease, Situation
+from app.gateway.frame_age import Age
 from app.gateway.held_keys import HeldKeys
 from app.gateway.messages import Jog
 from app.gateway.metrics import Metrics
@@ -49,8 +50,15 @@ class Keys(SessionKeys):
         jog = Jog(type="jog", hold=hold, action=UP, tick=tick_ms() if tick is None else tick)
         self.take(jog, self.situate)
 
-    def situate(self, now: float, stale: str | None) -> Situation:
-        return Situation({}, Lease(7) if self.lease else None, state(), stale=stale, at=now)
+    def situate(self, now: float, age: Age) -> Situation:
+        return Situation(
+            {},
+            Lease(7) if self.lease else None,
+            state(),
+            stale=age.stale,
+            life_ms=age.life_ms,
+            at=now,
+        )
 
     async def told(self) -> list[tuple[int, str | None]]:
         said = []
