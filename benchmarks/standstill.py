@@ -11,7 +11,7 @@ everything that was delayed and the hand still up, and the arm must not move aga
   of a real Chromium that drives.
 - ``network blackholed``: a proxy between client and gateway stops forwarding without closing, and
   later forwards everything at once.
-- ``uplink queues``: on a link of 10 ms the traffic of others holds the way up for 0.2 s; one more
+- ``uplink queues``: on a link of 10 ms the traffic of others holds the way up for 0.25 s; one more
   frame goes into that queue, and none follows. Counted from when that one was *sent*.
 - ``gateway killed``, ``gateway stopped``: SIGKILL, or SIGSTOP and later SIGCONT, of the gateway,
   whose node runs by itself; ``..., its own node``: whose node is its child. A child that has lost
@@ -46,7 +46,7 @@ FAILED_S = 2.5
 WATCHED_S = 2.5
 """How long the arm is watched after that."""
 FULL_SPEED_S = 30.0
-QUEUE_S = 0.2
+QUEUE_S = 0.25
 """So long the way up is held by somebody else."""
 
 

@@ -21,6 +21,9 @@ CHECK_S = 5.0
 """How often the file is looked at although nothing has changed: somebody may have removed it."""
 END_S = 1.0
 UNREADABLE = "the file of the latched stop is unreadable"
+STOP_WAITS = "the stop is not on the disk yet"
+RESET_WAITS = "the reset is not on the disk yet"
+LATCH_WAITS = "the stop latch is not on the disk yet"
 
 _NONE = LatchState(status="none")
 _KEPT = LatchState(status="kept")
@@ -92,12 +95,12 @@ class StopLatch:
                 return _NONE
             if self._kept == self._asked and self._trouble is None:
                 return _NONE if self._wanted is None else _KEPT
-            what = "the reset" if self._wanted is None else "the stop"
+            waits = RESET_WAITS if self._wanted is None else STOP_WAITS
             if self._asked == 1:
-                what = "the stop latch"
+                waits = LATCH_WAITS
             return LatchState(
                 status="pending" if self._trouble is None else "failed",
-                reason=self._trouble or f"{what} is not on the disk yet",
+                reason=self._trouble or waits,
                 waiting_ms=round((time.monotonic() - self._since) * 1000),
             )
 
