@@ -113,10 +113,11 @@ class StopLatch:
 
     def close(self) -> None:
         """Wait a moment for the disk, then let go of the file."""
-        if self._path is None:
-            return
-        self.wait(END_S)
         with self._changed:
+            if self._path is not None:
+                self._changed.wait_for(
+                    lambda: self._kept == self._asked or self._trouble is not None, END_S
+                )
             self._ending = True
             self._changed.notify_all()
 

@@ -13,6 +13,8 @@
 
     * ARMED if nothing was ever stopped, or N was met since; else HOLDING.
 
+Arming is also refused while the latch could not keep a stop, or does not know of a reset yet.
+
 Only in ARMED does anything move. The three categories of a stop:
 
 - S2: ramp to standstill within 200 ms, hold with power. Resumes by N, then a new gesture.

@@ -177,6 +177,18 @@ def test_a_file_that_somebody_removed_is_laid_down_again(
     assert StopLatch(tmp_path / "latch").load() == STOP
 
 
+def test_a_disk_that_becomes_read_only_is_told_before_a_stop_needs_it(
+    tmp_path: Path, open_latch: Open, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "CHECK_S", 0.05)
+    latch = open_latch(tmp_path / "latch")
+    assert latch.state.status == "none"
+    with read_only(tmp_path):
+        wait_for(lambda: latch.state.status == "failed", "it to be noticed")
+        assert latch.state.reason == "the stop latch cannot be written: Read-only file system"
+    wait_for(lambda: latch.state.status == "none", "it to be over")
+
+
 def test_a_disk_that_does_not_answer_at_the_start_counts_as_a_stop(
     tmp_path: Path, open_latch: Open, monkeypatch: pytest.MonkeyPatch
 ) -> None:
