@@ -77,6 +77,8 @@ class NodeProcess:
         self._start_s = start_s
         self._ending = threading.Event()
         self._process: subprocess.Popen[bytes] | None = None
+        self._stuck: list[subprocess.Popen[bytes]] = []
+        """Killed, and not gone yet."""
         self._started_at = 0.0
         self._failures = 0
         self._fault: str | None = "the robot node is starting"
@@ -130,6 +132,7 @@ class NodeProcess:
             self._end()
 
     def _spawn(self) -> None:
+        self._stuck = [process for process in self._stuck if process.poll() is None]
         try:
             self._process = subprocess.Popen(
                 [*self._command, *self._more()],
@@ -178,6 +181,7 @@ class NodeProcess:
                 self._process.wait(KILL_WAIT_S)
             except subprocess.TimeoutExpired:
                 log.error("the robot node was killed, but does not end: it waits for a disk")
+                self._stuck.append(self._process)
 
     def _end(self) -> None:
         process = self._process
