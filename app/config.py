@@ -441,6 +441,12 @@ class NodeSettings(_Section):
     latch: Path | None = Field(
         default=None, description="file that keeps the latched stop over a restart"
     )
+    stopped: str | None = Field(
+        default=None,
+        max_length=300,
+        description="begin stopped for this reason, whatever the latch says: who starts the node "
+        "knows that it was stopped",
+    )
     cameras: bool = Field(default=True, description="start the camera process, too")
     dry_runs: bool = Field(default=True, description="start the process that checks programs, too")
     parent: int | None = Field(

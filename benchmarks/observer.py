@@ -45,8 +45,9 @@ class Standstill(NamedTuple):
     """Tick of that state."""
     since_obeyed_ms: float | None
     """From the tick of the last command that the node itself obeyed, by when it held for want of
-    the next; None where it came to rest for another reason. Shorter than the first of these: the
-    one that watches missed a command or two."""
+    the next, as if that one had lived its full 250 ms: at most; None where it came to rest for
+    another reason. Shorter than the first of these: the one that watches missed a command or
+    two."""
 
 
 class Observer:
@@ -128,7 +129,7 @@ class Observer:
         heard = [
             command.tick
             for arrived, command in self.commands
-            if arrived <= until and arrived - command.tick <= COMMAND_TTL_MS
+            if arrived <= until and arrived - command.tick <= command.ttl_ms
         ]
         lapsed = [
             step.tick

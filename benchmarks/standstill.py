@@ -11,6 +11,8 @@ everything that was delayed and the hand still up, and the arm must not move aga
   of a real Chromium that drives.
 - ``network blackholed``: a proxy between client and gateway stops forwarding without closing, and
   later forwards everything at once.
+- ``uplink queues``: on a link of 10 ms the traffic of others holds the way up for 0.25 s; one more
+  frame goes into that queue, and none follows. Counted from when that one was *sent*.
 - ``gateway killed``, ``gateway stopped``: SIGKILL, or SIGSTOP and later SIGCONT, of the gateway,
   whose node runs by itself; ``..., its own node``: whose node is its child. A child that has lost
   its gateway brings the arm to rest and ends.
@@ -37,12 +39,15 @@ from benchmarks.operator import Operator
 from benchmarks.report import arguments, percentiles, promise, report
 from benchmarks.rig import JOGS, TOKEN, Rig, clip
 from tests.proxy import Proxy
+from tests.slow_link import SlowLink
 
 FAILED_S = 2.5
 """How long a fault lasts; longer than a lease lives."""
 WATCHED_S = 2.5
 """How long the arm is watched after that."""
 FULL_SPEED_S = 30.0
+QUEUE_S = 0.25
+"""So long the way up is held by somebody else."""
 
 
 class Outcome(NamedTuple):
@@ -50,6 +55,10 @@ class Outcome(NamedTuple):
 
     standstill: Standstill
     moved_again: bool
+    since_sent_ms: float | None = None
+    """From the sending of the last frame, where that is not about the moment of its arrival."""
+    life_ms: int | None = None
+    """What was left of the life of its command; None: nothing, it was not commanded."""
 
 
 class NotAtFullSpeed(RuntimeError):
@@ -112,6 +121,38 @@ def network_blackholed(rig: Rig, proxy: Proxy) -> Outcome:
     """The proxy stops forwarding, and later forwards everything."""
     url = f"http://127.0.0.1:{proxy.port}"
     return asyncio.run(drive_and_fail(rig, url, proxy.hold, proxy.forward))
+
+
+async def last_frame_queued(rig: Rig, link: SlowLink) -> Outcome:
+    """Drive at full speed; the way up fills; one more frame, and none after it."""
+    observer = rig.observer
+    await wait_async(lambda: observer.state.controller is None, "nobody drives")
+    observer.forget()
+    pictures = clip(rig.next_gesture())
+    async with Operator(f"http://127.0.0.1:{link.port}", TOKEN) as operator:
+        await operator.take_and_arm()
+        give_up = time.monotonic() + FULL_SPEED_S
+        await operator.play(
+            pictures.shown(),
+            until=lambda: observer.at_full_speed() or time.monotonic() > give_up,
+        )
+        if not observer.at_full_speed():
+            raise NotAtFullSpeed
+        link.queue_up(QUEUE_S)
+        await asyncio.sleep(0.03)  # what was on its way before has arrived
+        sent = tick_now()
+        number = await operator.show(pictures.held[0], flood=True)
+        await asyncio.sleep(WATCHED_S)
+        standstill = observer.standstill(sent, tick_now())
+    lives = [command.ttl_ms for _, command in observer.commands if command.frame == number]
+    moved = observer.moved_between(standstill.at, tick_now())
+    life = lives[0] if lives else None
+    return Outcome(standstill, moved, float(standstill.at - sent), life)
+
+
+def uplink_queues(rig: Rig, link: SlowLink) -> Outcome:
+    """The last frame waited behind somebody else's traffic."""
+    return asyncio.run(last_frame_queued(rig, link))
 
 
 def gateway_stopped(rig: Rig) -> Outcome:
@@ -185,6 +226,9 @@ def scenario(name: str, folder: Path) -> Iterator[Callable[[], Outcome]]:
             case "network blackholed":
                 with Proxy(urlsplit(rig.url).port or 0) as proxy:
                     yield lambda: network_blackholed(rig, proxy)
+            case "uplink queues":
+                with SlowLink(urlsplit(rig.url).port or 0, delay_s=0.01, rate=4e6) as link:
+                    yield lambda: uplink_queues(rig, link)
             case "gateway killed" | "gateway killed, its own node":
                 yield lambda: gateway_killed(rig)
             case _:
@@ -195,6 +239,7 @@ SCENARIOS = (
     "browser killed",
     "browser stopped",
     "network blackholed",
+    "uplink queues",
     "gateway killed",
     "gateway stopped",
     "gateway killed, its own node",
@@ -226,7 +271,7 @@ def measure(name: str, runs: int) -> dict[str, float | str]:
                 f"{', moved again' if newest.moved_again else ''}",
                 flush=True,
             )
-    took = [each.standstill.since_command_ms for each in outcomes]
+    took = [each.since_sent_ms or each.standstill.since_command_ms for each in outcomes]
     by_node = [each.standstill.since_obeyed_ms for each in outcomes]
     again = sum(each.moved_again for each in outcomes)
     return {

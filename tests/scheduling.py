@@ -24,6 +24,7 @@ LIVE = (
     "robot/test_camera.py",
     "robot/test_dry_run.py",
     "robot/test_node.py",
+    "robot/test_node_latch.py",
     "test_doctor.py",
     "test_faults.py",
     "test_unread_log.py",

@@ -28,6 +28,10 @@ class _Way:
         self._free_at = max(self._free_at, time.monotonic()) + size / self._rate
         return self._free_at + self._delay
 
+    def burden(self, seconds: float) -> None:
+        """Somebody else's bytes are before ours, for so long."""
+        self._free_at = max(self._free_at, time.monotonic()) + seconds
+
     def full_for(self) -> float:
         """Seconds until there is room in the buffer."""
         return self._free_at - _BUFFER / self._rate - time.monotonic()
@@ -56,6 +60,10 @@ class SlowLink(Proxy):
     def carried(self) -> tuple[int, int]:
         """Bytes so far, up to the server and down to the client."""
         return self._way_up.carried, self._way_down.carried
+
+    def queue_up(self, seconds: float) -> None:
+        """What is sent up from now on waits for so long behind what somebody else sends."""
+        self._loop.call_soon_threadsafe(self._way_up.burden, seconds)
 
     async def _pump(
         self, source: asyncio.StreamReader, sink: asyncio.StreamWriter, gate: asyncio.Event

@@ -24,9 +24,11 @@ from benchmarks.standstill import (
     gateway_killed,
     gateway_stopped,
     network_blackholed,
+    uplink_queues,
 )
 from tests.proxy import Proxy
 from tests.reordering import Reordering
+from tests.slow_link import SlowLink
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +65,21 @@ def stood(fault: Callable[[], Outcome]) -> bool:
 def test_a_network_that_swallows_everything(rig: Rig) -> None:
     with Proxy(urlsplit(rig.url).port or 0) as proxy:
         assert stood(lambda: network_blackholed(rig, proxy))
+
+
+def test_what_a_frame_waited_on_its_way_is_taken_off_the_life_of_its_command(rig: Rig) -> None:
+    with SlowLink(urlsplit(rig.url).port or 0, delay_s=0.01, rate=4e6) as link:
+        for _ in range(5):
+            with suppress(NotAtFullSpeed):
+                outcome = uplink_queues(rig, link)
+                break
+        else:
+            raise NotAtFullSpeed
+    # 250 ms less what was left of the 250 that it waited; or nothing at all.
+    assert outcome.life_ms is None or outcome.life_ms <= 100
+    assert outcome.since_sent_ms is not None
+    assert outcome.since_sent_ms <= 2 * STANDSTILL_MS
+    assert not outcome.moved_again
 
 
 @pytest.mark.parametrize(("one_way", "anew"), [(False, True), (True, True), (True, False)])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from app.gateway.numbers import Counter
 from app.link.actions import Action, Sequence, Stop, TurnJoint
-from app.link.messages import Command, Doubt, State, StopRequest
+from app.link.messages import COMMAND_TTL_MS, Command, Doubt, State, StopRequest
 from app.pipeline.types import Cause
 
 REST_S = 0.5
@@ -47,6 +47,9 @@ class Situation:
     """Newest state of the robot; None when it is not connected."""
     stale: str | None = None
     """Why the frame is too old to move anything, in plain words."""
+    life_ms: int = COMMAND_TTL_MS
+    """How long what is commanded now counts, from the newest state on: what the frame was under
+    way for is taken off."""
     unseen: str | None = None
     """Why the operator cannot see the robot, in plain words."""
     scale: float = 1.0
@@ -174,6 +177,7 @@ class Driver:
             epoch=situation.lease.epoch,
             sequence=self._sequence.next(),
             tick=situation.state.tick,
+            ttl_ms=situation.life_ms,
             frame=frame,
             hold=self._hold,
             gesture=gesture,

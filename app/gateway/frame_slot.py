@@ -7,7 +7,7 @@ from collections.abc import Callable
 from app.config import Settings
 from app.errors import FrameRefused, NotAllowed
 from app.gateway.drive import Situation
-from app.gateway.frame_age import FrameAge
+from app.gateway.frame_age import Age, FrameAge
 from app.gateway.frame_job import FrameJob
 from app.gateway.gallery import Enrolled
 from app.gateway.metrics import Metrics
@@ -16,8 +16,8 @@ from app.gateway.roles import FRAME, Role, may_send
 from app.link.header import HEADER_SIZE, FrameHeader
 from app.pipeline.decode import read_within
 
-Situate = Callable[[Enrolled, float, str | None], Situation]
-"""With this gallery, now (s, monotonic), of a frame that is too old for this reason or is not."""
+Situate = Callable[[Enrolled, float, Age], Situation]
+"""With this gallery, now (s, monotonic), of a frame of this age."""
 
 
 class FrameSlot:
@@ -88,13 +88,13 @@ class FrameSlot:
         if detail:
             self._next_detail = now + self._detail_s
         enrolled = self._enrolled()
-        stale = self._age(header.tick, header.captured_ms, tick_ms())
+        age = self._age(header.tick, header.captured_ms, tick_ms())
         self._job = FrameJob(
             seq=seq,
             jpeg=jpeg,
             arrived=now,
             arrival=arrival,
-            situation=self._situate(enrolled, now, stale),
+            situation=self._situate(enrolled, now, age),
             enrolled=enrolled,
             detail=detail,
             glass=self.glass,

@@ -58,6 +58,7 @@ class HeldKeys:
             epoch=situation.lease.epoch,
             sequence=self._sequence.next(),
             tick=situation.state.tick,
+            ttl_ms=situation.life_ms,
             hold=self._hold,
             gesture=None if jog.action is None else SHOWN,
             action=jog.action if reason is None else None,

@@ -184,9 +184,7 @@ class Hub:
         """
         check_reply(await self.ask(LeaseRequest(kind="reset", holder=source[:80])))
         # What is told next should show it already; a state may have been on its way meanwhile.
-        await asyncio.to_thread(
-            self.robot.wait_newer, CONFIRM_RESET_S, lambda state: state.mode != "stopped"
-        )
+        await asyncio.to_thread(self.robot.wait_reset, CONFIRM_RESET_S)
 
     async def reset_scene(self, source: str) -> None:
         """Put every movable thing back where it was at first.

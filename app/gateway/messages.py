@@ -112,6 +112,9 @@ class Jog(_ClientMessage):
     action: HeldAction | None = Field(description="null: nothing is held, and the way is alive")
     scale: float = Field(default=1.0, ge=0.05, le=1.0, description="part of the session's speed")
     tick: int = Field(ge=1, description="newest server tick that the client has seen, ms")
+    at: float | None = Field(
+        default=None, ge=0, lt=1e15, description="when it is sent, ms on the client's own clock"
+    )
 
 
 class Ping(_ClientMessage):

@@ -30,6 +30,8 @@ PAUSED_S = 0.5
 may not have read yet what the node said meanwhile."""
 STOP_WAIT_S = 1.5
 """After asking the node to end, and before killing it."""
+KILL_WAIT_S = 3.0
+"""One that waits inside the kernel, for a frozen disk, ends only when the disk answers."""
 _SECRETS = ("FARHAND_TOKEN",)
 
 
@@ -58,6 +60,7 @@ class NodeProcess:
         last_word: ``time.monotonic()`` of the newest state from the robot, or None.
         hung_s: No state for this long: killed and started again.
         start_s: Time from the start to the first state.
+        more: What to add to the command, asked at every start.
     """
 
     def __init__(
@@ -67,13 +70,17 @@ class NodeProcess:
         last_word: Callable[[], float | None],
         hung_s: float,
         start_s: float,
+        more: Callable[[], Sequence[str]] = lambda: (),
     ) -> None:
         self._command = list(command)
+        self._more = more
         self._last_word = last_word
         self._hung_s = hung_s
         self._start_s = start_s
         self._ending = threading.Event()
         self._process: subprocess.Popen[bytes] | None = None
+        self._stuck: list[subprocess.Popen[bytes]] = []
+        """Killed, and not gone yet."""
         self._started_at = 0.0
         self._failures = 0
         self._fault: str | None = "the robot node is starting"
@@ -127,9 +134,10 @@ class NodeProcess:
             self._end()
 
     def _spawn(self) -> None:
+        self._stuck = [process for process in self._stuck if process.poll() is None]
         try:
             self._process = subprocess.Popen(
-                self._command,
+                [*self._command, *self._more()],
                 stdin=subprocess.DEVNULL,
                 # Standard output is for the link that `farhand serve` prints.
                 stdout=logs.standard_error(),
@@ -173,7 +181,11 @@ class NodeProcess:
     def _kill(self) -> None:
         self._signal(signal.SIGKILL)
         if self._process is not None:
-            self._process.wait()
+            try:
+                self._process.wait(KILL_WAIT_S)
+            except subprocess.TimeoutExpired:
+                log.error("the robot node was killed, but does not end: it waits for a disk")
+                self._stuck.append(self._process)
 
     def _end(self) -> None:
         process = self._process

@@ -48,6 +48,8 @@ async def health(request: Request) -> dict[str, Any]:
                 "age_ms": None if robot.age_s is None else round(robot.age_s * 1000),
                 "restarts": robot.restarts,
                 "pid": robot.node_pid,
+                "latch": None if robot.state is None else robot.state.latch.model_dump(),
+                "remembered": robot.stop_memory.kept.model_dump(),
             }
         ],
     }

@@ -17,6 +17,7 @@ from typing import Protocol
 from app.config import DEFAULT_PROFILE, Settings
 from app.errors import CannotStart, FarhandError, LinkFailed, RobotUnavailable
 from app.gateway.node_process import NodeProcess, node_command
+from app.gateway.stop_memory import StopMemory
 from app.link.gateway_end import GatewayEnd, OnPicture
 from app.link.messages import (
     Command,
@@ -36,6 +37,7 @@ log = logging.getLogger(__name__)
 TEND_S = 0.2
 DRY_RUN_S = 30.0
 """A check breaks off after 12 s by itself; on a slow machine its arm has to be made first."""
+LOST = "the robot was stopped and has not been reset, but does not say so: it is stopped again"
 RESEND_S = 0.1
 """A stop that is not confirmed is sent again this often."""
 
@@ -75,6 +77,7 @@ class RobotPort:
         self._ending = threading.Event()
         self._folder: Path | None = None
         self._process: NodeProcess | None = None
+        self.stop_memory = StopMemory(settings.data_dir / f"stop-{self.id}.remembered")
         endpoint = settings.robot.endpoint
         profile = settings.robot.profile or DEFAULT_PROFILE
         if settings.robot.profile is not None:
@@ -92,6 +95,7 @@ class RobotPort:
                 last_word=lambda: self._state_at,
                 hung_s=settings.gateway.robot_hung_ms / 1000,
                 start_s=settings.gateway.robot_start_s,
+                more=self._still_stopped,
             )
         if endpoint is None:
             raise CannotStart(
@@ -119,6 +123,7 @@ class RobotPort:
             self._process.close()
         if self._folder is not None:
             shutil.rmtree(self._folder, ignore_errors=True)
+        self.stop_memory.close()
 
     # What is known
 
@@ -182,6 +187,18 @@ class RobotPort:
         with self._changed:
             return self._changed.wait_for(has_come, timeout_s)
 
+    def wait_reset(self, timeout_s: float) -> bool:
+        """Wait until the robot shows a reset that it granted, and the disk knows it in both places.
+
+        Returns:
+            False when that takes longer; :attr:`state` and :attr:`stop_memory` tell what lacks.
+        """
+        ends = time.monotonic() + timeout_s
+        shown = self.wait_newer(
+            timeout_s, lambda state: state.mode != "stopped" and state.latch.status == "none"
+        )
+        return self.stop_memory.wait(max(0.0, ends - time.monotonic())) and shown
+
     # Asking
 
     def send(self, command: Command) -> None:
@@ -215,6 +232,7 @@ class RobotPort:
                     link.stop(request)
             if not told:  # after it was sent, because a log may make us wait
                 told = True
+                self.stop_memory.asked(request)
                 log.warning("stop: %s (%s)", request.reason, request.source)
             left = sent_at + timeout_s - time.monotonic()
             with self._changed:
@@ -230,6 +248,9 @@ class RobotPort:
     def ask(self, request: LeaseRequest) -> LeaseReply:
         """Ask the node's control loop and wait for its answer.
 
+        A robot that was stopped, and does not say so any more although nobody has reset it, is not
+        asked to arm.
+
         Raises:
             RobotUnavailable: no answer came in time.
         """
@@ -238,7 +259,13 @@ class RobotPort:
             raise RobotUnavailable(
                 f"the robot cannot be asked: {self.fault or 'it does not answer'}", robot=self.id
             )
-        return link.ask(request, timeout=self._ask_timeout_s)
+        if request.kind == "arm" and self.stop_memory.owed is not None:
+            return LeaseReply(granted=False, code="latched", reason=LOST)
+        reply = link.ask(request, timeout=self._ask_timeout_s)
+        if request.kind == "reset" and reply.granted:
+            # The node first: whoever of us two fails between comes back stopped.
+            self.stop_memory.was_reset()
+        return reply
 
     def dry_run(self, request: DryRunRequest) -> DryRunReport:
         """Ask what an action would do, and wait for the answer; nothing moves.
@@ -275,6 +302,15 @@ class RobotPort:
             self._state_at = time.monotonic()
             self._lost = False
             self._changed.notify_all()
+        if (stop := self.stop_memory.saw(state)) is not None and (link := self._link) is not None:
+            log.warning("the robot does not show its stop, which is sent again: %s", stop.reason)
+            with contextlib.suppress(RobotUnavailable):
+                link.stop(stop)
+
+    def _still_stopped(self) -> list[str]:
+        """What a node that starts is told of what it may not remember itself."""
+        stop = self.stop_memory.remembered
+        return [] if stop is None else [f"--stopped={stop.reason}"]
 
     def _take_alive(self, alive: bool) -> None:
         if not alive:

@@ -46,6 +46,7 @@ def robot_message(robot: RobotPort) -> dict[str, Any]:
             "seq_tick": state.began,
             "stop": state.stop,
             "stops": state.stops,
+            "latch": state.latch.model_dump(),
             "reason": state.reason,
             "action": None
             if state.action is None
@@ -77,6 +78,7 @@ def robot_summary(robot: RobotPort) -> dict[str, Any]:
     """One entry of ``GET /api/robots``."""
     message = robot_message(robot)
     description = robot.description
+    state = robot.state
     keep = ("online", "mode", "armed", "controller", "fault", "age_ms")
     return {
         "id": robot.id,
@@ -84,6 +86,8 @@ def robot_summary(robot: RobotPort) -> dict[str, Any]:
         "model": description.model if description is not None else None,
         **{name: message[name] for name in keep},
         "restarts": robot.restarts,
+        "latch": None if state is None else state.latch.model_dump(),
+        "remembered": robot.stop_memory.kept.model_dump(),
     }
 
 

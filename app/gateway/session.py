@@ -14,6 +14,7 @@ from app.gateway.closing import CLOSE_INTERNAL, CLOSE_TOO_BIG, CLOSE_TOO_SLOW, C
 from app.gateway.drive import Situation
 from app.gateway.errors import INTERNAL_MESSAGE
 from app.gateway.eyes import PictureAge
+from app.gateway.frame_age import Age
 from app.gateway.frame_job import FrameWorker
 from app.gateway.frame_slot import FrameSlot
 from app.gateway.frame_work import FrameWork
@@ -218,25 +219,26 @@ class OperatorSession:
         return time.monotonic() - self._heard_at
 
     def _situation(
-        self, enrolled: Enrolled, now: float, stale: str | None, *, by_keys: bool = False
+        self, enrolled: Enrolled, now: float, age: Age, *, by_keys: bool = False
     ) -> Situation:
         state = self._hub.robot.live_state
         return Situation(
             actions=enrolled.actions,
             lease=self._leases.lease,
             state=state,
-            stale=stale,
+            stale=age.stale,
+            life_ms=age.life_ms,
             unseen=None if state is None else self._pictures(state.tick),
             scale=self._scale,
             at=now,
             by_keys=by_keys,
         )
 
-    def _situation_of_frame(self, enrolled: Enrolled, now: float, stale: str | None) -> Situation:
-        return self._situation(enrolled, now, stale, by_keys=self._keys.drive(now))
+    def _situation_of_frame(self, enrolled: Enrolled, now: float, age: Age) -> Situation:
+        return self._situation(enrolled, now, age, by_keys=self._keys.drive(now))
 
-    def _situation_of_key(self, now: float, stale: str | None) -> Situation:
-        return self._situation(self._gallery.enrolled, now, stale)
+    def _situation_of_key(self, now: float, age: Age) -> Situation:
+        return self._situation(self._gallery.enrolled, now, age)
 
     def _take_text(self, text: str) -> None:
         message = parse_client_message(text)

@@ -6,7 +6,7 @@ from typing import Any
 
 from app.gateway.diary.session import SessionDiary
 from app.gateway.drive import Situation
-from app.gateway.frame_age import FrameAge
+from app.gateway.frame_age import Age, FrameAge
 from app.gateway.held_keys import HeldKeys
 from app.gateway.messages import Jog
 from app.gateway.metrics import Metrics
@@ -53,16 +53,16 @@ class SessionKeys:
         """Whether the session drives by keys at ``now`` (s, monotonic)."""
         return now - self._at < KEYS_S
 
-    def take(self, jog: Jog, situate: Callable[[float, str | None], Situation]) -> None:
+    def take(self, jog: Jog, situate: Callable[[float, Age], Situation]) -> None:
         """Command what a held key asks for, and say when nothing comes of it, and why.
 
         Args:
             jog: What is held.
-            situate: The situation now (s, monotonic), of a key press that is too old for this
-                reason.
+            situate: The situation now (s, monotonic), of a key press of this age.
         """
         now = self._at = time.monotonic()
-        decision = self._keys.decide(jog, situate(now, self._age(jog.tick, 0.0, tick_ms())))
+        age = self._age(jog.tick, jog.at or 0.0, tick_ms())
+        decision = self._keys.decide(jog, situate(now, age))
         self._diary.jog(jog, decision)
         if decision.command is not None:
             self._robot.send(decision.command)

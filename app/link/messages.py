@@ -155,6 +155,19 @@ class LoopState(Message):
     )
 
 
+class LatchState(Message):
+    """Whether what is in force of a latched stop, or of its reset, is on the disk."""
+
+    status: Literal["none", "pending", "kept", "failed"] = Field(
+        default="none",
+        description="none: no stop is latched, and the disk says so, or nothing keeps one. kept: "
+        "the stop in force is on the disk. pending: the newest stop or reset is not on the disk "
+        "yet. failed: it could not be written; tried again every second",
+    )
+    reason: str | None = Field(default=None, description="in plain words", max_length=300)
+    waiting_ms: int = Field(default=0, ge=0, description="ms since the disk knew what is in force")
+
+
 class State(Message):
     """What the robot is and does. Key ``/state``, 60 times a second, from the control loop."""
 
@@ -171,6 +184,8 @@ class State(Message):
     doubt: Doubt | None = Field(default=None, description="why it holds, when doubt is the reason")
     fault: str | None = None
     stops: int = Field(default=0, description="stop requests received; confirms a StopRequest")
+    resets: int = Field(default=0, ge=0, description="latched stops left since the node started")
+    latch: LatchState = LatchState()
     joints: tuple[float, ...] = Field(description="rad, measured")
     velocities: tuple[float, ...] = Field(description="rad/s, measured")
     commanded: tuple[float, ...] = Field(description="rad, where the motion generator is")

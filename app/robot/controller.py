@@ -178,6 +178,8 @@ class Controller:
             reason=self._note if safety.may_move else safety.reason,
             fault=self.fault,
             stops=safety.stops,
+            resets=safety.resets,
+            latch=safety.latch,
             joints=tuple(reading.joints.tolist()),
             velocities=tuple(reading.velocities.tolist()),
             commanded=tuple(motion.trajectory.position.tolist()),

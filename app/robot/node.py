@@ -54,9 +54,13 @@ class Node:
         self._arm = arm
         self._end = end
         self._description = arm.description.model_copy(update={"id": settings.id})
+        self._latch = StopLatch(settings.latch)
         self.controller = Controller(
-            arm, settings.id, settings.motion, StopLatch(settings.latch), time.monotonic()
+            arm, settings.id, settings.motion, self._latch, time.monotonic()
         )
+        if settings.stopped is not None:
+            # Of no account where the latch says the same.
+            self.controller.safety.stop(StopRequest(source="gateway", reason=settings.stopped))
         self._clock = LoopClock(DT)
         self._ending: str | None = None
         self._cycles = 0
@@ -88,7 +92,8 @@ class Node:
         )
 
     def close(self) -> None:
-        """Let go of link and arm."""
+        """Let go of latch, link and arm."""
+        self._latch.close()
         self._end.close()
         self._arm.close()
 
@@ -186,6 +191,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--profile", default="puma560", help="name or file of the robot's profile")
     parser.add_argument("--endpoint", required=True, help="unixsock-stream/PATH to listen on")
     parser.add_argument("--latch", type=Path, help="file that keeps a latched stop")
+    parser.add_argument(
+        "--stopped", help="begin stopped for this reason, whatever the latch's file says"
+    )
     parser.add_argument("--no-cameras", action="store_true", help="start no camera process")
     parser.add_argument("--no-dry-runs", action="store_true", help="start no dry-run process")
     parser.add_argument(
@@ -199,6 +207,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 profile=given.profile,
                 endpoint=given.endpoint,
                 latch=given.latch,
+                stopped=given.stopped,
                 cameras=not given.no_cameras,
                 dry_runs=not given.no_dry_runs,
                 parent=given.parent,

@@ -13,6 +13,8 @@
 
     * ARMED if nothing was ever stopped, or N was met since; else HOLDING.
 
+Arming is also refused while the latch could not keep a stop, or does not know of a reset yet.
+
 Only in ARMED does anything move. The three categories of a stop:
 
 - S2: ramp to standstill within 200 ms, hold with power. Resumes by N, then a new gesture.
@@ -28,7 +30,7 @@ import enum
 import logging
 from collections import deque
 
-from app.link.messages import LeaseReply, StopCategory, StopRequest, Transition
+from app.link.messages import LatchState, LeaseReply, StopCategory, StopRequest, Transition
 from app.robot.latch import StopLatch
 
 log = logging.getLogger(__name__)
@@ -72,6 +74,8 @@ class Safety:
         self.reason: str | None = "not armed yet"
         self.stops = 0
         """Stop requests received."""
+        self.resets = 0
+        """Latched stops that were left."""
         self._no_gesture_since: float | None = None
         self._owes_n = False
         """There was a stop, and N has not been met since."""
@@ -89,6 +93,11 @@ class Safety:
         """Motion is allowed."""
         return self.phase is Phase.ARMED
 
+    @property
+    def latch(self) -> LatchState:
+        """What the disk knows of the latched stop."""
+        return self._latch.state
+
     def request(self, stop: StopRequest) -> None:
         """Somebody asks for a stop."""
         self.stops += 1
@@ -104,7 +113,7 @@ class Safety:
             log.info("stop %s changes nothing, %s is in force: %s", stop.category, self.phase, why)
             return
         self._go(Phase.STOPPED, stop.category, why)
-        self._latch.set(stop)
+        self._latch.set(stop)  # waits for nothing: the ramp begins in this very cycle
 
     def hold(self, reason: str) -> None:
         """S2: stand until N. Changes nothing where the arm may not move anyway."""
@@ -120,6 +129,10 @@ class Safety:
             return LeaseReply(
                 granted=False, code="latched", reason=f"stopped: {self.reason}; reset it first"
             )
+        if (latch := self._latch.state).reason is not None:
+            # What moves must be able to be stopped for good; and a reset that the disk does not
+            # know yet is not over.
+            return LeaseReply(granted=False, code="latch_not_kept", reason=latch.reason)
         if self._owes_n:
             self._no_gesture_since = None
             why = "armed: show no gesture for half a second, then a new gesture"
@@ -139,12 +152,16 @@ class Safety:
             self._go(Phase.DISARMED, "S2", reason)
 
     def reset(self, *, at_rest: bool) -> LeaseReply:
-        """Leave the latched stop. Moves nothing, and leaves the robot disarmed."""
+        """Leave the latched stop. Moves nothing, and leaves the robot disarmed.
+
+        Until the disk knows, :attr:`latch` says so, and nobody can arm.
+        """
         if self.phase is not Phase.STOPPED:
             return LeaseReply(granted=True, reason="nothing to reset")
         if not at_rest:
             return LeaseReply(granted=False, code="moving", reason="the arm has not come to rest")
         self._latch.clear()
+        self.resets += 1
         self._go(Phase.DISARMED, None, "reset; not armed yet")
         return LeaseReply(granted=True)
 

@@ -171,8 +171,10 @@ def literals() -> Iterator[str]:
 ASSEMBLED = re.compile(
     r"(is at|ends at) its (upper|lower) limit|(turns|moves) at most at|is not a new one"
     r"|s? (is|are) here already|mm from (its own|the)"
+    r"|No space left on device|Read-only file system"
 )
-"""What the server puts together from parts that are too short to be looked for."""
+"""What the server puts together from parts that are too short to be looked for, and what the
+operating system says."""
 
 
 def test_the_server_still_says_what_is_put_into_german(modules: Page) -> None:

@@ -25,6 +25,7 @@ from app.link.messages import (
     Command,
     Description,
     JointDescription,
+    LatchState,
     LeaseReply,
     LeaseRequest,
     State,
@@ -201,6 +202,8 @@ class StandIn:
         self.silent = False
         """Publish no state and answer nothing, as a process that hangs."""
         self.deaf_to_stops = False
+        self.resets = 0
+        self.latch = LatchState()
         self.commands: list[Command] = []
         self.stops: list[StopRequest] = []
         self.requests: list[LeaseRequest] = []
@@ -253,6 +256,7 @@ class StandIn:
                 self.epoch += 1
                 return LeaseReply(granted=True, epoch=self.epoch)
             case "reset":
+                self.resets += self.mode == "stopped"
                 self.mode = "disarmed"
                 return LeaseReply(granted=True)
             case "reset_scene":
@@ -282,6 +286,8 @@ class StandIn:
             controller=self.holder,
             epoch=self.epoch,
             stops=len(self.stops),
+            resets=self.resets,
+            latch=self.latch,
             joints=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6),
             velocities=(0.0,) * 6,
             commanded=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6),

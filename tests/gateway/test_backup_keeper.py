@@ -117,7 +117,7 @@ def test_a_lost_database_is_told_and_nobody_arms_until_it_is_restored(
         with pytest.raises(CannotStart, match="a server has the gesture database open"):
             recovery.restore(place_in(lost))
         assert len(backups(lost)) == 1, "the starter set pushes no backup out"
-    node.mode = "disarmed"
+    node.mode, node.resets = "disarmed", 1
     recovery.restore(place_in(lost))
     with running(settings_for(lost, node.endpoint)) as server:
         assert server.http.get("/api/health").json()["database"] == "ok"

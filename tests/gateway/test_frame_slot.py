@@ -10,6 +10,7 @@ import simplejpeg
 from app.config import Settings
 from app.errors import FrameRefused, NotAllowed
 from app.gateway.drive import Situation
+from app.gateway.frame_age import Age
 from app.gateway.frame_slot import FrameSlot
 from app.gateway.gallery import Enrolled, fit
 from app.gateway.metrics import Metrics
@@ -38,9 +39,9 @@ class Slot(FrameSlot):
         self.metrics = Metrics()
         super().__init__(role, SETTINGS, self.metrics, lambda: ENROLLED, self.situate)
 
-    def situate(self, enrolled: Enrolled, now: float, stale: str | None) -> Situation:
+    def situate(self, enrolled: Enrolled, now: float, age: Age) -> Situation:
         assert enrolled is ENROLLED
-        return Situation({}, None, None, stale=stale, at=now)
+        return Situation({}, None, None, stale=age.stale, life_ms=age.life_ms, at=now)
 
     def counted(self, result: str) -> float:
         return float(self.metrics.frames.labels(result)._value.get())

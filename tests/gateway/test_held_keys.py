@@ -34,6 +34,15 @@ def test_nothing_held_is_a_command_too(keys: HeldKeys) -> None:
     assert (command.action, command.gesture, command.epoch, command.tick) == (None, None, 7, 1234)
 
 
+@pytest.mark.parametrize("held", [True, False])
+def test_a_command_lives_as_long_as_is_left(keys: HeldKeys, held: bool) -> None:
+    late = replace(READY, life_ms=70)
+    by_key = keys.decide(jog(1, held=held), late).command
+    by_hand = Driver("me", Counter(), Counter()).decide(None, 1, late).command
+    assert by_key is not None and by_key.ttl_ms == 70
+    assert by_hand is not None and by_hand.ttl_ms == 70
+
+
 def test_every_press_has_a_number_of_its_own(keys: HeldKeys) -> None:
     commands = [keys.decide(jog(hold), READY).command for hold in (1, 1, 2)]
     commands.append(keys.decide(jog(2, held=False), READY).command)

@@ -10,7 +10,9 @@ from pathlib import Path
 import psutil
 import pytest
 
+from app.gateway import node_process as module
 from app.gateway.node_process import NodeProcess, describe_exit, node_environment
+from tests.disks import freezable
 from tests.gateway.running import wait_for
 
 
@@ -42,6 +44,45 @@ def test_a_crash_is_told_and_mended() -> None:
     finally:
         process.close()
     assert process.pid is None
+
+
+def test_what_to_add_is_asked_at_every_start(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    script = f"import sys; print(*sys.argv[1:], file=open({str(log)!r}, 'a')); sys.exit(1)"
+    added = iter(range(1000))
+    process = NodeProcess(
+        [sys.executable, "-c", script],
+        last_word=Word(),
+        hung_s=1,
+        start_s=30,
+        more=lambda: [f"--stopped={next(added)}"],
+    )
+    process.start()
+    try:
+        wait_for(lambda: process.restarts >= 2, "two starts")
+    finally:
+        process.close()
+    assert log.read_text().splitlines()[:2] == ["--stopped=0", "--stopped=1"]
+
+
+def test_one_that_waits_for_a_frozen_disk_does_not_hold_up_who_killed_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "KILL_WAIT_S", 0.2)
+    with freezable(tmp_path) as disk:
+        disk.freeze()
+        name = str(disk.folder / "made")
+        process = supervise(f"open({name!r}, 'w')", Word(), start_s=1.0)
+        try:
+            wait_for(lambda: process.restarts >= 1, "another start")
+            assert process.fault is not None and "did not answer" in process.fault
+            process.close()
+        finally:
+            disk.thaw()
+            process.close()
+        killed = process._stuck
+        assert killed
+        wait_for(lambda: all(each.poll() is not None for each in killed), "their end")
 
 
 def test_a_signal_is_named() -> None:

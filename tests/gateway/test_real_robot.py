@@ -177,6 +177,28 @@ def test_a_crash_is_told_within_a_moment_and_mended(ready: Running) -> None:
         assert [child for child in children if child.is_running()] == []
 
 
+def test_a_node_that_was_stopped_comes_back_stopped_though_its_latch_is_lost(
+    ready: Running,
+) -> None:
+    assert ready.http.post("/api/robots/puma/stop").status_code == 200
+    with ready.operator() as operator:
+        operator.next("robot", mode="stopped")
+        pid = ready.hub.robot.node_pid
+        assert pid is not None
+        os.kill(pid, signal.SIGKILL)
+        operator.next("robot", online=False)
+        (ready.hub.settings.data_dir / "stop-puma.latch").unlink()
+        back = operator.next("robot", online=True, timeout_s=60)
+        assert (back["mode"], back["stop"]) == ("stopped", "S1")
+        assert ready.hub.robot.node_pid not in (None, pid)
+        operator.send("reset")
+        operator.next("robot", mode="disarmed")
+        operator.send("take_control")
+        operator.next("robot", controller=operator.hello["session"])
+        operator.send("arm")
+        operator.next("robot", armed=True)
+
+
 def test_a_hang_is_noticed_and_mended(ready: Running) -> None:
     with ready.operator() as operator:
         operator.next("robot", online=True)

@@ -5,6 +5,7 @@ import time
 from typing import Any
 
 from app.gateway.drive import Lease, Situation
+from app.gateway.frame_age import Age
 from app.gateway.held_keys import HeldKeys
 from app.gateway.messages import Jog
 from app.gateway.metrics import Metrics
@@ -12,7 +13,7 @@ from app.gateway.numbers import Counter, tick_ms
 from app.gateway.outbox import Outbox
 from app.gateway.session_keys import KEYS_S, SessionKeys
 from app.link.actions import JogCartesian
-from app.link.messages import Command
+from app.link.messages import COMMAND_TTL_MS, Command
 from tests.gateway.test_drive import state
 
 UP = JogCartesian(linear=(0.0, 0.0, 0.1))
@@ -49,8 +50,15 @@ class Keys(SessionKeys):
         jog = Jog(type="jog", hold=hold, action=UP, tick=tick_ms() if tick is None else tick)
         self.take(jog, self.situate)
 
-    def situate(self, now: float, stale: str | None) -> Situation:
-        return Situation({}, Lease(7) if self.lease else None, state(), stale=stale, at=now)
+    def situate(self, now: float, age: Age) -> Situation:
+        return Situation(
+            {},
+            Lease(7) if self.lease else None,
+            state(),
+            stale=age.stale,
+            life_ms=age.life_ms,
+            at=now,
+        )
 
     async def told(self) -> list[tuple[int, str | None]]:
         said = []
@@ -90,6 +98,26 @@ async def test_an_old_press_moves_nothing() -> None:
     assert keys.robot.commands == []
     ((_, reason),) = await keys.told()
     assert reason is not None and reason.startswith("the key press is too old to move the robot")
+
+
+async def test_what_a_press_was_under_way_for_is_taken_off_the_life_of_its_command() -> None:
+    keys = Keys()
+    mine = 5_000_000.0  # a clock of the client's own
+
+    def press(late_ms: int) -> int | None:
+        now = tick_ms()
+        seen, at = max(1, now - late_ms - 10), mine + now - late_ms
+        before = len(keys.robot.commands)
+        keys.take(Jog(type="jog", hold=1, action=UP, tick=seen, at=at), keys.situate)
+        sent = keys.robot.commands[before:]
+        return sent[0].ttl_ms if sent else None
+
+    prompt = press(0)
+    assert prompt is not None and 230 <= prompt <= COMMAND_TTL_MS
+    late = press(150)
+    assert late is not None and late <= 100
+    assert press(260) is None
+    assert (await keys.told())[-1][1] is not None
 
 
 def test_a_session_drives_by_keys_for_a_while_after_the_last_message() -> None:

@@ -268,14 +268,17 @@ def test_a_reset_waits_for_standstill() -> None:
 
 
 def test_the_latch_survives_a_restart(tmp_path) -> None:
-    operator = Operator(StopLatch(tmp_path / "latch"))
-    operator.controller.stop(StopRequest(source="page", reason="button"))
-    again = Operator(StopLatch(tmp_path / "latch"))
+    latch = StopLatch(tmp_path / "latch")
+    Operator(latch).controller.stop(StopRequest(source="page", reason="button"))
+    latch.close()
+    latch = StopLatch(tmp_path / "latch")
+    again = Operator(latch)
     assert again.state.mode == "stopped"
     assert again.state.reason == "button (from before the node started)"
     again.ask("take")
     assert not again.ask("arm").granted
     assert again.ask("reset").granted
+    latch.close()
     assert Operator(StopLatch(tmp_path / "latch")).state.mode == "disarmed"
 
 

@@ -1,6 +1,5 @@
-from app.link.messages import Command, StopRequest
+from app.link.messages import Command
 from app.robot.command_gate import CommandGate
-from app.robot.latch import StopLatch
 from app.robot.lease import LEASE_S, Lease
 
 
@@ -68,28 +67,3 @@ def test_sequences_start_again_with_a_new_epoch() -> None:
     gate = CommandGate()
     assert gate.admit(command(epoch=1, sequence=100), 1, 1000)
     assert gate.admit(command(epoch=2, sequence=1), 2, 1000)
-
-
-def test_the_latch_outlives_its_process(tmp_path) -> None:
-    path = tmp_path / "made" / "latch"
-    stop = StopRequest(source="page", reason="button")
-    assert StopLatch(path).load() is None
-    StopLatch(path).set(stop)
-    assert StopLatch(path).load() == stop
-    StopLatch(path).clear()
-    StopLatch(path).clear()
-    assert StopLatch(path).load() is None
-
-
-def test_a_latch_that_cannot_be_read_is_set(tmp_path) -> None:
-    path = tmp_path / "latch"
-    path.write_bytes(b"\x00")
-    loaded = StopLatch(path).load()
-    assert loaded is not None
-    assert loaded.reason == "the file of the latched stop is unreadable"
-
-
-def test_no_file_keeps_nothing() -> None:
-    latch = StopLatch(None)
-    latch.set(StopRequest(source="page", reason="button"))
-    assert latch.load() is None

@@ -111,10 +111,11 @@ class Remote:
 
 
 class NodeProcess:
-    def __init__(self, *more: str) -> None:
+    def __init__(self, *more: str, latch: Path | None = None) -> None:
         self.folder = Path(tempfile.mkdtemp(prefix="fh-"))
         self.endpoint = socket_endpoint(self.folder / "n.sock")
-        self.more = [*more, "--latch", str(self.folder / "latch"), "--no-cameras", "--no-dry-runs"]
+        self.latch = latch or self.folder / "latch"
+        self.more = [*more, "--latch", str(self.latch), "--no-cameras", "--no-dry-runs"]
         self.start()
 
     def start(self) -> None:
@@ -243,6 +244,7 @@ def test_a_stop_comes_through_a_flood_latches_and_survives_a_crash(
     again.ask("take")
     assert again.ask("arm").code == "latched"
     assert again.ask("reset").granted
+    wait_for(lambda: again.state.latch.status == "none", "the reset on the disk")
     assert again.ask("arm").granted
     again.end.close()
 
@@ -326,12 +328,12 @@ def test_a_loop_that_failed_brakes_whatever_the_error_says(tmp_path: Path) -> No
         arm.braked = node.controller.braked = False
         node.stop_at_once("the control loop failed: " + "no profile " * 100)
         assert arm.braked
-        latched = StopLatch(settings.latch).load()
-        assert latched is not None
-        assert latched.category == "S0"
-        assert latched.reason.startswith("the control loop failed: no profile")
     finally:
         node.close()
+    latched = StopLatch(settings.latch).load()
+    assert latched is not None
+    assert latched.category == "S0"
+    assert latched.reason.startswith("the control loop failed: no profile")
 
 
 def test_it_ends_when_its_parent_was_gone_before_it_ran(tmp_path: Path) -> None:

@@ -169,6 +169,8 @@ def test_only_the_newest_steps_are_kept() -> None:
 
 
 def test_a_stop_from_before_the_start_is_a_step(tmp_path) -> None:
-    Safety(StopLatch(tmp_path / "latch")).stop(stop("S1"))
+    latch = StopLatch(tmp_path / "latch")
+    Safety(latch).stop(stop("S1"))
+    latch.close()
     (step,) = Safety(StopLatch(tmp_path / "latch"), tick=7).transitions
     assert (step.tick, step.before, step.after, step.stop) == (7, "disarmed", "stopped", "S1")

@@ -71,6 +71,6 @@ export class Held extends EventTarget {
         const { tick } = this.#link;
         if (!tick) return; // nothing was heard of the server yet
         const { action = null, scale = 1 } = this.#now || {};
-        this.#link.send("jog", { hold: this.#hold, action, scale, tick });
+        this.#link.send("jog", { hold: this.#hold, action, scale, tick, at: performance.now() });
     }
 }

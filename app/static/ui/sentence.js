@@ -51,8 +51,25 @@ function whileDriving(state, now) {
     return frame.reason ? asSentence(toldOf(frame.reason, state.description)) : words.ready;
 }
 
-/** What is happening and why, in one or two short sentences. */
+const LATCH_LATE_MS = 1000; // an ordinary disk answers within milliseconds
+
+/** What the disk does not know of a stop or its reset, or null. */
+function whatIsNotKept({ robot, description }) {
+    const latch = robot && robot.online ? robot.latch : null;
+    if (!latch || !latch.reason) return null;
+    if (latch.status !== "failed" && latch.waiting_ms <= LATCH_LATE_MS) return null;
+    const why = toldOf(latch.reason, description);
+    return robot.mode === "stopped" ? words.stopNotKept(why) : words.latchNotKept(why);
+}
+
+/** What is happening and why, in a few short sentences. */
 export function sentenceFor(state, now) {
+    const said = happening(state, now);
+    const more = state.connection.state === "open" ? whatIsNotKept(state) : null;
+    return more ? `${said} ${more}` : said;
+}
+
+function happening(state, now) {
     const link = state.connection.state;
     if (link === "signed-out") return words.signedOut;
     if (link !== "open") return state.hello ? words.gone : words.connecting;

@@ -60,6 +60,37 @@ def test_an_observer_is_told_to_watch(modules: Page) -> None:
     assert told() == "Stopped. An operator can reset it."
 
 
+@pytest.mark.parametrize(
+    ("mode", "status", "waiting_ms", "more"),
+    [
+        ("stopped", "kept", 0, ""),
+        ("stopped", "pending", 900, ""),
+        ("stopped", "pending", 1100, " Do not switch the robot off: it is not there."),
+        ("stopped", "failed", 0, " Do not switch the robot off: it is not there."),
+        ("disarmed", "failed", 0, " The robot cannot be armed: it is not there."),
+    ],
+)
+def test_what_the_disk_does_not_know_is_said(
+    modules: Page, mode: str, status: str, waiting_ms: int, more: str
+) -> None:
+    reason = None if status == "kept" else "it is not there"
+    state: dict[str, Any] = {
+        "connection": {"state": "open"},
+        "hello": {"session": "me", "role": "observer"},
+        "robot": {
+            "mode": mode,
+            "controller": None,
+            "online": True,
+            "latch": {"status": status, "reason": reason, "waiting_ms": waiting_ms},
+        },
+        "source": {"state": "none"},
+    }
+    told = str(run(modules, "ui/sentence.js", "return m.sentenceFor(a, 100)", state))
+    state["robot"]["latch"] = None
+    without = str(run(modules, "ui/sentence.js", "return m.sentenceFor(a, 100)", state))
+    assert told == without + more
+
+
 def holding(doubt: str | None, reason: str) -> dict[str, Any]:
     """A store of one who drives an arm that holds still."""
     return {
