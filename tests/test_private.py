@@ -2,7 +2,11 @@
 
 import logging
 import os
+import shutil
 import stat
+import subprocess
+import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -134,6 +138,38 @@ def test_a_folder_or_file_of_another_user_is_not_touched(tmp_path: Path) -> None
     os.chown(folder / "memory.db", 4711, 4711)
     private_folder(folder)
     assert mode(folder / "memory.db") == 0o644
+
+
+READ_ALL = """
+import sqlite3, sys
+for name in sys.argv[1:]:
+    try:
+        connection = sqlite3.connect(f"file:{name}?mode=ro", uri=True)
+        connection.execute("SELECT count(*) FROM sqlite_schema").fetchall()
+    except sqlite3.OperationalError:
+        print("kept out")
+    else:
+        print("read", name)
+"""
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can be another user")
+def test_another_user_neither_reads_nor_locks_the_databases() -> None:
+    with tempfile.TemporaryDirectory(prefix="fh-") as place:
+        Path(place).chmod(0o755)
+        settings = Settings(data_dir=Path(place) / "data")
+        store = open_store(settings)
+        names = [settings.data_dir / "gestures.db", settings.data_dir / "memory.db"]
+        memory = open_memory(names[1])
+        # Even where the folder lets others through.
+        settings.data_dir.chmod(0o755)
+        command = [shutil.which("python3", path=os.defpath) or sys.executable, "-c", READ_ALL]
+        done = subprocess.run(
+            [*command, *map(str, names)], user=65534, cwd="/", capture_output=True, text=True
+        )
+        memory.close()
+        store.close()
+    assert done.stdout.split("\n") == ["kept out", "kept out", ""], done.stderr
 
 
 def test_a_folder_that_cannot_be_made_is_one_clear_line(tmp_path: Path) -> None:
