@@ -14,7 +14,7 @@ COPY gesture_db gesture_db
 RUN uv pip install --python /opt/farhand/bin/python --no-deps .
 
 FROM python:3.11-slim-bookworm
-RUN useradd --system --uid 10001 --create-home farhand && install -d -o farhand /data
+RUN useradd --system --uid 10001 --create-home farhand && install -d -m 0700 -o farhand /data
 COPY --from=build /opt/farhand /opt/farhand
 ENV PATH=/opt/farhand/bin:$PATH PYTHONUNBUFFERED=1 \
     FARHAND_DATA_DIR=/data FARHAND_HOST=0.0.0.0 FARHAND_PORT=8000 FARHAND_BEHIND_PROXY=true \

@@ -115,8 +115,10 @@ def robot(
     """Start a robot node by itself, for a gateway that runs elsewhere."""
     from app import logs
     from app.config import NodeSettings
+    from app.private import keep_private
     from app.robot.node import run_node
 
+    keep_private()
     settings = NodeSettings(id=id, profile=profile, endpoint=endpoint, latch=latch)
     with logs.written_apart():
         run_node(settings)
@@ -202,7 +204,9 @@ def replay(
 def doctor(data_dir: DataDir = None, port: int | None = None) -> None:
     """Check what Farhand needs on this machine, and say how to mend what is wrong."""
     from app.doctor import run_checks
+    from app.private import keep_private
 
+    keep_private()
     if not run_checks(settings_for(data_dir=data_dir, port=port)):
         raise typer.Exit(1)
 

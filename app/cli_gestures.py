@@ -39,7 +39,9 @@ def open_store(settings: "Settings") -> "GestureStore":
         CannotStart: the folder cannot be made or written.
     """
     from app.gateway.gallery import open_store as open_configured
+    from app.private import keep_private
 
+    keep_private()
     return open_configured(settings)
 
 
@@ -163,7 +165,9 @@ def restore(
 
 def _place(data_dir: Path | None) -> "Place":
     from app.gateway.gallery import place_of
+    from app.private import keep_private
 
+    keep_private()
     place = place_of(settings_for(data_dir=data_dir))
     if place is None:
         raise Invalid("backups are made of an SQLite database; this one has its own ways")

@@ -28,7 +28,11 @@ _UNITS = {"m": 60, "h": 3600, "d": 86400}
 def _store(settings: "Settings") -> "TokenStore":
     """The file alone: a token from the environment is not of these commands' making."""
     from app.gateway.tokens import TokenStore
+    from app.private import keep_private, private_folder
 
+    keep_private()
+    if settings.data_dir.exists():
+        private_folder(settings.data_dir)
     return TokenStore.from_settings(settings.model_copy(update={"token": None}))
 
 

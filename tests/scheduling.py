@@ -37,6 +37,7 @@ _IN_TIME = ("e2e/", "gateway/", "link/", "test_cli.py", *LIVE)
 SECONDS = {
     "test_cli.py": 100,
     "gateway/test_serve.py": 60,
+    "robot/sim/test_brakes.py": 50,
     "robot/test_random_commands.py": 50,
     "e2e/test_remote.py": 40,
     "test_pick_and_place.py": 40,

@@ -244,6 +244,26 @@ def test_tokens_are_made_listed_and_revoked(tmp_path: Path) -> None:
     assert [row["role"] for row in rows] == ["operator"]
 
 
+def test_what_commands_write_is_their_users_alone(tmp_path: Path, photo: Path) -> None:
+    data, exported = tmp_path / "data", tmp_path / "set"
+    home = ("--action", '{"type":"home"}')
+    before = os.umask(0o022)
+    try:
+        farhand("token", "make", "--role", "observer", "--data-dir", str(data))
+        farhand("enroll", "wave", str(photo), *home, "--data-dir", str(data))
+        farhand("gestures", "export", str(exported), "--data-dir", str(data))
+        farhand("gestures", "export", str(tmp_path / "set.zip"), "--data-dir", str(data))
+        made = [data, *data.rglob("*"), exported, *exported.rglob("*"), tmp_path / "set.zip"]
+        assert {f"{path.stat().st_mode & 0o077:03o}" for path in made} == {"000"}
+        # A folder that an older version left open is mended by the next command.
+        data.chmod(0o755)
+        (data / "gestures.db").chmod(0o644)
+        farhand("token", "list", "--data-dir", str(data))
+        assert (data.stat().st_mode | (data / "gestures.db").stat().st_mode) & 0o077 == 0
+    finally:
+        os.umask(before)
+
+
 def test_the_fingerprint_of_the_authority_is_told(tmp_path: Path) -> None:
     authority = LocalAuthority(tmp_path / "data" / "tls", machine_names)
     authority.prepare()

@@ -13,13 +13,14 @@ from sqlalchemy import make_url
 from sqlalchemy.exc import ArgumentError
 
 from app.config import PipelineSettings, Settings
-from app.errors import CannotStart, NotFound
+from app.errors import NotFound
 from app.gestures import Gesture, GestureStore
 from app.gestures.backup import Place
 from app.gestures.records import SHARED
 from app.gestures.recovery import Hold, check_there, open_or_set_aside
 from app.link.actions import Action
 from app.pipeline import Gallery, PcaMatcher, unpack_template
+from app.private import private_file, private_folder
 from app.robot.models import load_model
 
 log = logging.getLogger(__name__)
@@ -46,21 +47,16 @@ def open_store(settings: Settings) -> GestureStore:
 
     Raises:
         DatabaseBroken: it cannot be read, or is gone although there are backups.
-        CannotStart: the folder cannot be made or written, or the robot's profile is wrong.
+        CannotStart: the folder cannot be made or written or is another user's, or the robot's
+            profile is wrong.
     """
     url = settings.database_url
     if url is None:
-        try:
-            settings.data_dir.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise CannotStart(
-                f"the data folder {settings.data_dir} cannot be made ({error.strerror}); "
-                "choose another with --data-dir",
-                path=str(settings.data_dir),
-            ) from error
+        private_folder(settings.data_dir)
         url = f"sqlite:///{settings.data_dir.absolute() / DATABASE_FILE}"
     place = place_of(settings)
     if place is not None:
+        private_file(place.database)
         check_there(place)
     profile = settings.robot.profile
     actions = load_model(profile).starter if profile is not None else {}

@@ -9,6 +9,7 @@ import signal
 import socket
 import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from types import FrameType
 
 import cv2
@@ -25,9 +26,13 @@ from app.gateway.greeting import greet
 from app.gateway.tls import LocalAuthority
 from app.gateway.tokens import TokenStore
 from app.gateway.transport import check_transport, keep_certificate, local_authority
+from app.private import keep_private, private_folder
+from app.process_lock import ProcessLock
 
 log = logging.getLogger(__name__)
 
+LOCK_FILE = "server.lock"
+"""In the data folder; held by the server that uses it."""
 BACKLOG = 128
 SOCKET_CEILING = 16 << 20
 """Bytes of a WebSocket message at which uvicorn itself cuts the connection. Far above our own
@@ -208,6 +213,23 @@ async def _run(
                 await asyncio.gather(keeping, return_exceptions=True)
 
 
+def lock_data_folder(folder: Path) -> ProcessLock:
+    """Keep every other server out of a data folder, and other users of the machine too.
+
+    Two servers would share databases and the latch of the stop: a reset at one would delete what
+    was stopped at the other.
+
+    Raises:
+        CannotStart: another server has it, or it cannot be had.
+    """
+    private_folder(folder)
+    return ProcessLock(
+        folder / LOCK_FILE,
+        f"the data folder {folder}",
+        "end that server first, or choose another folder with --data-dir",
+    )
+
+
 def serve(settings: Settings) -> None:
     """Run the server until it is asked to end by SIGINT or SIGTERM. Main thread only.
 
@@ -215,11 +237,13 @@ def serve(settings: Settings) -> None:
     a terminal also one for observers, codes for phones, and how to trust the certificate.
 
     Raises:
-        CannotStart: the port, the data folder, the page or the certificate.
+        CannotStart: the port, the data folder (also when another server has it), the page or the
+            certificate.
         DatabaseBroken: the gesture database cannot be read.
     """
     for name, level in LOG_LEVELS.items():
         logging.getLogger(name).setLevel(level)
+    keep_private()
     # Two frames at once are better than one frame on two cores.
     cv2.setNumThreads(1)
     with logs.written_apart():
@@ -229,7 +253,11 @@ def serve(settings: Settings) -> None:
 def _serve(settings: Settings) -> None:
     check_transport(settings)
     signals = Signals()
-    with bind(settings) as listener, signals.caught():
+    with (
+        contextlib.closing(lock_data_folder(settings.data_dir)),
+        bind(settings) as listener,
+        signals.caught(),
+    ):
         port = int(listener.getsockname()[1])
         tokens = TokenStore.from_settings(settings)
         authority = local_authority(settings)

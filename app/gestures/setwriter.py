@@ -44,11 +44,12 @@ def write_set(gestures: Iterable[NewGesture], target: Path) -> None:
                     _add(archive, name, data)
             os.replace(path, target)
         else:
+            whole = staging / "set"  # of the process's own modes, other than what mkdtemp makes
+            whole.mkdir()
             for name, data in files.items():
-                (staging / name).parent.mkdir(exist_ok=True)
-                (staging / name).write_bytes(data)
-            staging.chmod(0o755)
-            os.replace(staging, target)
+                (whole / name).parent.mkdir(exist_ok=True)
+                (whole / name).write_bytes(data)
+            os.replace(whole, target)
     finally:
         shutil.rmtree(staging, ignore_errors=True)
 

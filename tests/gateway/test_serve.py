@@ -31,7 +31,7 @@ from websockets.typing import Subprotocol
 from app.config import Settings
 from app.errors import CannotStart
 from app.gateway.greeting import address, greet, link
-from app.gateway.serve import bind
+from app.gateway.serve import LOCK_FILE, bind, lock_data_folder
 from app.gateway.tls import FOLDER, read_authority
 from app.gateway.tokens import TokenStore
 from app.gateway.transport import check_transport, keep_certificate, local_authority
@@ -184,7 +184,54 @@ def test_a_busy_port_is_one_clear_line(tmp_path: Path) -> None:
         "end it, or choose another with --port (0 picks a free one)\n"
     )
     # Nothing was begun: not even the token.
-    assert list(tmp_path.iterdir()) == []
+    assert [path.name for path in tmp_path.iterdir()] == [LOCK_FILE]
+
+
+def test_a_data_folder_has_one_server(folder: Path, node: StandIn) -> None:
+    """Refused while the first runs and while it is stopped; not once it was killed."""
+    data = folder / "data"
+    latch = data / "stop-puma.latch"
+    latch.write_text('{"source": "anna", "reason": "somebody is in the cell"}')
+    with program(data, node.endpoint) as first:
+        read_link(first)
+        for number in (None, signal.SIGSTOP):
+            if number is not None:
+                first.send_signal(number)
+            with program(data, node.endpoint) as second:
+                out, err = second.communicate(timeout=60)
+            assert second.returncode == 1
+            assert out == ""
+            since = r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d[+-]\d\d:\d\d"
+            assert re.fullmatch(
+                rf"farhand: the data folder {data} is in use by process {first.pid} since {since}; "
+                "end that server first, or choose another folder with --data-dir\n",
+                err,
+            )
+        # What is made to work beside a server does.
+        TokenStore.from_settings(settings_for(folder, "-")).make("observer", "", None)
+        first.kill()
+        first.wait()
+    assert latch.is_file()
+    with program(data, node.endpoint) as third:
+        read_link(third)
+
+
+def test_a_data_folder_is_closed_to_other_users(folder: Path) -> None:
+    data = folder / "data"
+    data.chmod(0o755)
+    (data / "gestures.db").chmod(0o644)
+    with program(data) as process:
+        read_link(process)
+        made = {path.name for path in data.iterdir()}
+        assert made >= {"gestures.db", "memory.db", "tokens.json", "stop-puma.latch.lock"}
+        for path in [data, *data.rglob("*")]:
+            assert path.stat().st_mode & 0o077 == 0, path
+
+
+def test_a_data_folder_of_another_kind_is_one_clear_line(tmp_path: Path) -> None:
+    tmp_path.chmod(0o1777)
+    with pytest.raises(CannotStart, match="all users share"):
+        lock_data_folder(tmp_path)
 
 
 def test_a_database_of_something_else_is_one_clear_line(tmp_path: Path) -> None:

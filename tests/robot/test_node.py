@@ -352,6 +352,29 @@ def test_it_ends_when_its_parent_was_gone_before_it_ran(tmp_path: Path) -> None:
     assert "ending: the process that started it is gone" in done.stderr
 
 
+def test_a_stop_latch_has_one_node(node: NodeProcess, remote: Remote) -> None:
+    """Two would delete one another's stops; the second is refused, also while the first hangs."""
+    remote.end.stop(StopRequest(source="anna", reason="somebody is in the cell"))
+    wait_for(lambda: remote.state.mode == "stopped", "the stop")
+    node.process.send_signal(signal.SIGSTOP)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", "app.robot.node", "--endpoint", node.endpoint + "2", *node.more],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
+    finally:
+        node.process.send_signal(signal.SIGCONT)
+    assert done.returncode == 1
+    said = done.stderr.strip().splitlines()[-1]
+    latch = node.folder / "latch"
+    assert said.startswith(f"the stop latch {latch} is in use by process {node.process.pid} since ")
+    assert said.endswith("; end that robot node first, or give this one a latch of its own")
+    assert latch.is_file()
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -5,7 +5,9 @@ import pybullet
 
 from app.link.messages import ObjectState
 from app.robot.arm import Contact, Reading, Vector
-from app.robot.models import model_assets
+from app.robot.models import load_profile, model_assets
+from app.robot.sim.brake_check import GRAVITY, MARGIN, weakest_brake
+from app.robot.sim.brakes import Brakes
 from app.robot.sim.kinematics import SerialKinematics
 from app.robot.sim.proximity import FLOOR, SimulatedProximity
 from app.robot.sim.world import (
@@ -23,8 +25,6 @@ _POSITION_GAIN = 0.3
 _SOLVER_ITERATIONS = 120
 """With Bullet's usual 50 the chain of brakes, coupled fingers and held thing does not converge, and
 things slip; 120 leave no slip that can be measured. Most steps end early, by the residual."""
-_BRAKED_SPEED = 0.005
-"""rad/s; slower than this, a braking joint counts as standing and is locked where it is."""
 _TOUCH = 0.5
 """N; what presses on a finger with less is not held."""
 _LOST_STEPS = 24
@@ -46,7 +46,8 @@ class SimulatedArm:
         objects: Whether table and objects are there.
 
     Raises:
-        CannotStart: there is no such model, its meshes are missing, or PyBullet lacks numpy.
+        CannotStart: there is no such model, its meshes are missing, its brakes cannot hold it, or
+            PyBullet lacks numpy.
     """
 
     def __init__(
@@ -61,7 +62,7 @@ class SimulatedArm:
         )
         self.client = connect()
         self._open = True
-        pybullet.setGravity(0, 0, -9.81, physicsClientId=self.client)
+        pybullet.setGravity(0, 0, -GRAVITY, physicsClientId=self.client)
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=1 / STEPS_PER_SECOND,
             numSolverIterations=_SOLVER_ITERATIONS,
@@ -76,11 +77,12 @@ class SimulatedArm:
         self._fingers = [joints[name] for name in gripper.fingers] if gripper else []
         self._measured = self._joints + self._fingers
         self._torques = [joint.torque for joint in self.model.joints]
-        self._brakes = [joint.brake for joint in self.model.joints]
+        self._brakes = Brakes(
+            self.client, self.body, self._joints, [joint.brake for joint in self.model.joints]
+        )
         self._gains = [_POSITION_GAIN] * len(self._joints)
         self._speed_gains = [1.0] * len(self._joints)
-        self._braked = False
-        self._locked = False
+        self._check_brakes(model)
         self._place(self.home)
         self._couple_fingers()
         self.objects: dict[str, int] = {}
@@ -124,7 +126,7 @@ class SimulatedArm:
 
         For the end of the coming step. Has no effect while the brakes are on: the motors are off.
         """
-        if self._braked:
+        if self._brakes.engaged:
             return
         pybullet.setJointMotorControlArray(
             self.body,
@@ -167,17 +169,17 @@ class SimulatedArm:
     def brake(self, engaged: bool) -> None:
         """Engaged: motors off and brakes on, nothing drops. Released: the motors hold.
 
-        The brakes first bring a moving joint to rest with their torque, then lock it where it
-        stands. The gripper has no brake: its fingers keep their force, as a spring-closed one does.
+        The brakes bring a moving joint to rest with their torque, then hold it exactly where it
+        stands, against as much as that torque. The gripper has no brake: its fingers keep their
+        force, as a spring-closed one does.
         """
-        if engaged == self._braked:
+        if engaged == self._brakes.engaged:
             return
         if engaged:
-            self._braked, self._locked = True, False
-            self._rub()
+            self._brakes.engage()
         else:
-            self._braked = False
-            self.move(self._angles()[0], np.zeros(len(self._joints)))
+            self._brakes.release()
+            self.move(self._angles(), np.zeros(len(self._joints)))
 
     def reset_scene(self) -> None:
         """Put every thing that can move back where it was at first, at rest."""
@@ -186,10 +188,7 @@ class SimulatedArm:
     def step(self) -> None:
         """Let 1/240 s pass."""
         pybullet.stepSimulation(physicsClientId=self.client)
-        if self._braked and not self._locked:
-            joints, velocities = self._angles()
-            if np.abs(velocities).max() < _BRAKED_SPEED:
-                self._lock(joints)
+        self._brakes.after_step()
 
     def close(self) -> None:
         """Give the Bullet world back. Closing twice does no harm."""
@@ -198,35 +197,31 @@ class SimulatedArm:
             self.proximity.close()
             pybullet.disconnect(self.client)
 
-    def _angles(self) -> tuple[Vector, Vector]:
+    def _angles(self) -> Vector:
         states = pybullet.getJointStates(self.body, self._joints, physicsClientId=self.client)
-        return np.array([state[0] for state in states]), np.array([state[1] for state in states])
+        return np.array([state[0] for state in states])
 
-    def _rub(self) -> None:
-        """Brake a motion: no speed is wanted, with at most the brakes' torque."""
-        pybullet.setJointMotorControlArray(
-            self.body,
-            self._joints,
-            pybullet.VELOCITY_CONTROL,
-            targetVelocities=[0.0] * len(self._joints),
-            forces=self._brakes,
-            physicsClientId=self.client,
-        )
+    def _check_brakes(self, profile: str) -> None:
+        """Refuse an arm that drops when its brakes come on.
 
-    def _lock(self, joints: Vector) -> None:
-        """Hold still at exactly these angles, from which speed control alone creeps away."""
-        pybullet.setJointMotorControlArray(
-            self.body,
-            self._joints,
-            pybullet.POSITION_CONTROL,
-            targetPositions=joints,
-            targetVelocities=[0.0] * len(self._joints),
-            forces=self._brakes,
-            positionGains=self._gains,
-            velocityGains=self._speed_gains,
-            physicsClientId=self.client,
+        Raises:
+            CannotStart: with the numbers, and the line of the profile.
+        """
+        weak = weakest_brake(self.client, self.body, self._joints, self.model, self.kinematics)
+        if weak is None:
+            return
+        joint = self.model.joints[weak.joint]
+        unit = "N" if self.description.joints[weak.joint].unit == "m" else "Nm"
+        load = f" and {weak.load:.2g} kg in its gripper" if weak.load else ""
+        self.close()
+        raise load_profile(profile).wrong(
+            f"{joint.name}: its brake of {joint.brake:g} {unit} does not hold the arm{load}: that "
+            f"takes up to {weak.needed:.3g} {unit}, and {MARGIN:g} times as much to be sure, "
+            f"{weak.needed * MARGIN:.3g} {unit}",
+            "joints",
+            weak.joint,
+            "brake",
         )
-        self._locked = True
 
     def _place(self, joints: Vector) -> None:
         """Put the joints somewhere at once, the fingers open."""

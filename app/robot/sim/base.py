@@ -25,6 +25,7 @@ from app.errors import CannotStart
 from app.link.messages import ObjectState
 from app.robot.arm import Reading, ToolPose, Vector
 from app.robot.models import MobileBaseModel, ModelAssets, ObjectModel
+from app.robot.sim.brakes import Brakes
 from app.robot.sim.kinematics import Matrix, fixed_pose
 from app.robot.sim.world import (
     STEPS_PER_SECOND,
@@ -39,8 +40,6 @@ from app.robot.sim.world import (
 _GAIN = 40.0
 """1/s; speed asked for per m (or rad) that the base is behind. A turn is then at most 5 mrad
 behind, and stands 0.17 s after a stop; with 12 it is 13 mrad and 0.3 s."""
-_BRAKED_SPEED = 0.02
-"""rad/s; slower than this, a braking wheel counts as standing and is locked where it is."""
 _SETTLE_STEPS = 60
 _SOLVER_ITERATIONS = 100
 
@@ -114,12 +113,13 @@ class SimulatedBase:
         count = len(self.base.left), len(self.base.right)
         self._sides = np.array([-1.0] * count[0] + [1.0] * count[1])
         self._torque = self.model.joints[0].torque
-        self._brake = self.model.joints[0].brake
+        brake = self.model.joints[0].brake
+        self._brakes = Brakes(
+            self.client, self.body, self._wheels, [brake] * len(self._wheels), wheels=True
+        )
         # Bullet gives a body's pose at its centre of mass; ours is the first link's frame.
         dynamics = pybullet.getDynamicsInfo(self.body, -1, physicsClientId=self.client)
         self._from_mass = pybullet.invertTransform(dynamics[3], dynamics[4])
-        self._braked = False
-        self._locked = False
         self._driven = self._turned = 0.0
         self._place(objects)
         self._pose = self._measure()
@@ -141,7 +141,7 @@ class SimulatedBase:
 
         For the end of the coming step. Has no effect while the brakes are on: the motors are off.
         """
-        if self._braked:
+        if self._brakes.engaged:
             return
         behind = joints - velocities / STEPS_PER_SECOND - (self._driven, self._turned)
         drive, turn = velocities + _GAIN * behind
@@ -163,33 +163,25 @@ class SimulatedBase:
         reset_objects(self.client, self.model.objects, dict(self._moving))
 
     def brake(self, engaged: bool) -> None:
-        """Engaged: motors off, wheels braked to rest and then locked. Released: motors hold."""
-        if engaged == self._braked:
+        """Engaged: motors off, wheels braked to rest and then held. Released: motors hold."""
+        if engaged == self._brakes.engaged:
             return
-        self._braked, self._locked = engaged, False
         if engaged:
-            pybullet.setJointMotorControlArray(
-                self.body,
-                self._wheels,
-                pybullet.VELOCITY_CONTROL,
-                targetVelocities=[0.0] * len(self._wheels),
-                forces=[self._brake] * len(self._wheels),
-                physicsClientId=self.client,
-            )
+            self._brakes.engage()
         else:
+            self._brakes.release()
             self.move(np.array([self._driven, self._turned]), np.zeros(2))
 
     def step(self) -> None:
         """Let 1/240 s pass."""
         pybullet.stepSimulation(physicsClientId=self.client)
+        self._brakes.after_step()
         before, self._pose = self._pose, self._measure()
         turned = math.remainder(self._pose[2] - before[2], 2 * math.pi)
         heading = before[2] + turned / 2
         dx, dy = self._pose[0] - before[0], self._pose[1] - before[1]
         self._driven += math.cos(heading) * dx + math.sin(heading) * dy
         self._turned += turned
-        if self._braked and not self._locked:
-            self._lock_if_still()
 
     def close(self) -> None:
         """Give the Bullet world back. Closing twice does no harm."""
@@ -212,20 +204,6 @@ class SimulatedBase:
         heading = self._pose[2]
         forward = math.cos(heading) * linear[0] + math.sin(heading) * linear[1]
         return np.array([forward, angular[2]])
-
-    def _lock_if_still(self) -> None:
-        """Hold the wheels at exactly these angles, from which speed control alone creeps away."""
-        states = pybullet.getJointStates(self.body, self._wheels, physicsClientId=self.client)
-        if max(abs(state[1]) for state in states) < _BRAKED_SPEED:
-            pybullet.setJointMotorControlArray(
-                self.body,
-                self._wheels,
-                pybullet.POSITION_CONTROL,
-                targetPositions=[state[0] for state in states],
-                forces=[self._brake] * len(self._wheels),
-                physicsClientId=self.client,
-            )
-            self._locked = True
 
     def _place(self, objects: bool) -> None:
         """Put the base on the floor at the middle of the room, and let it come to rest there."""

@@ -41,6 +41,7 @@ class KinematicArm(SimulatedArm):
             gripper: Between the fingers.
             objects: Where the things that can move are; others stay where they were at first.
         """
+        self._brakes.release()
         self._at, self._speed = joints.copy(), np.zeros_like(joints)
         self._width = self._wanted_width = gripper
         for thing in objects:
@@ -63,7 +64,9 @@ class KinematicArm(SimulatedArm):
         )
 
     def move(self, joints: Vector, velocities: Vector) -> None:
-        """Be there at once: rad and rad/s, shape (n,)."""
+        """Be there at once: rad and rad/s, shape (n,). Has no effect while the brakes are on."""
+        if self._brakes.engaged:
+            return
         self._at, self._speed = joints.copy(), velocities.copy()
 
     def grip(self, width: float, force: float | None = None) -> None:
@@ -71,7 +74,12 @@ class KinematicArm(SimulatedArm):
         self._wanted_width = min(max(width, 0.0), self.description.gripper_max)
 
     def brake(self, engaged: bool) -> None:
-        """There is nothing to hold."""
+        """Engaged: stands where it is, at once. There is nothing that could slip."""
+        if engaged:
+            self._brakes.engage()
+            self._speed = np.zeros_like(self._at)
+        else:
+            self._brakes.release()
 
     def step(self) -> None:
         """Let one step pass."""
