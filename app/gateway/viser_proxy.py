@@ -59,7 +59,7 @@ async def _scene(hub: "Hub") -> tuple[ViserScene, Path]:
     if hub.viser.failure is not None:
         raise ViewerUnavailable(f"there is no 3D view: {hub.viser.failure}")
     if socket is None:
-        raise ViewerUnavailable("the 3D view is still starting; try again")
+        raise ViewerUnavailable("the 3D view is still starting, or ending; try again")
     return hub.viser, socket
 
 
