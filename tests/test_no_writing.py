@@ -19,14 +19,16 @@ BEFORE = "before the loop begins"
 THREAD = "in a thread of its own"
 MAY_WRITE = {
     "app/gateway/greeting.py": "in a thread of its own, to a stream that waits for nobody",
-    "app/gateway/gallery.py::open_store": f"{THREAD}, before anything is served",
     "app/gateway/robot_port.py": "a folder for the link: before the node starts, and after its end",
     "app/gateway/tls.py": f"{THREAD}, or before anything is served",
     "app/gateway/tokens.py::TokenStore._change": "by the command line, and by the greeting",
+    "app/gateway/viser_server.py::PrivateServer": "a folder for the socket: the 3D view's thread",
     "app/link/node_end.py::private_folder": BEFORE,
     "app/robot/beside.py::give_way": "the processes beside the node, when they start",
-    "app/robot/latch.py": "a thread of its own writes what has to outlive the node",
+    "app/robot/latch.py::StopLatch._begin": "the latch's thread, when it begins",
+    "app/robot/latch_file.py": "the latch's thread alone, which nobody waits for",
     "app/robot/models/": f"{BEFORE}, or in a process beside it",
+    "app/robot/node.py::lock_latch": BEFORE,
     "app/robot/node.py::main": BEFORE,
     "app/robot/sim/__init__.py": BEFORE,
     "app/robot/sim/scenery.py::_load_visuals": "the camera process, when it starts",

@@ -89,7 +89,7 @@ def test_a_node_that_runs_by_itself(reader: Reader, tmp_path: Path) -> None:
             driver.ready()
             driver.show(JogJoint(joint=1, velocity=FULL_SPEED), 1, observer.at_full_speed)
             pressed = tick_now()
-            driver.end.stop(StopRequest(source="test"))
+            driver.end.stop(StopRequest(source="test", reason="a test"))
             wait(lambda: observer.state.mode == "stopped" and observer.stands(), "the stop")
             stood = observer.standstill(pressed, tick_now())
             assert stood.since_fault_ms <= 2 * STANDSTILL_MS
@@ -100,7 +100,7 @@ def test_a_node_that_runs_by_itself(reader: Reader, tmp_path: Path) -> None:
                 return 0 if loop is None else loop.log_lines_dropped
 
             while not lost():
-                assert not driver.end.ask(LeaseRequest(kind="reset_scene", holder="x"), 5).granted
+                assert not driver.end.ask(LeaseRequest(kind="arm", holder="x"), 5).granted
             reader.go_on()
             wait(lambda: "were dropped" in reader.text, "the count")
             driver.end.close()
