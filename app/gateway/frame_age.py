@@ -4,6 +4,9 @@ from typing import NamedTuple
 
 from app.link.messages import COMMAND_TTL_MS
 
+SPARE_MS = 30
+"""Of the 500 ms that are promised from sending to standstill a command's life and the ramp leave
+46; so much of them is for the way, and the rest for a loop that is late."""
 JUMP_MS = 250
 """A capture clock that disagrees with the bound by more has stood still, or was set."""
 DRIFT = 200e-6
@@ -21,7 +24,7 @@ class Age(NamedTuple):
     @property
     def life_ms(self) -> int:
         """What is left of the life of a command."""
-        return max(0, COMMAND_TTL_MS - self.known_ms)
+        return max(0, COMMAND_TTL_MS - max(0, self.known_ms - SPARE_MS))
 
 
 class FrameAge:
@@ -85,11 +88,11 @@ class FrameAge:
             return self._stale(
                 known, f"its sender had seen nothing newer than {round(bound)} ms ago", self._limit
             )
-        if known >= COMMAND_TTL_MS:
+        if known >= COMMAND_TTL_MS + SPARE_MS:
             how = f"it came {known} ms later than others did"
             if seen_tick:
                 how = f"it was under way for {known} ms"
-            return self._stale(known, how, COMMAND_TTL_MS)
+            return self._stale(known, how, COMMAND_TTL_MS + SPARE_MS)
         return Age(known)
 
     def _lateness(self, offset: float, bound: float, way: float, now_ms: int) -> float:
