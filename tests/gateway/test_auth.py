@@ -12,7 +12,8 @@ from websockets.sync.client import connect
 
 from app.config import Settings
 from app.errors import NotAllowed, NotSignedIn, RequestError
-from app.gateway.auth import Gatekeeper, Identity, is_loopback, same_host
+from app.gateway.auth import Gatekeeper, Identity
+from app.gateway.origin import is_loopback, same_host
 from app.gateway.serve import LOG_CONFIG
 from app.gateway.throttle import TooManyGuesses
 from app.gateway.tokens import GIVEN, TokenStore

@@ -24,8 +24,8 @@ from pydantic import SecretStr, ValidationError
 
 from app.config import Settings
 from app.errors import CannotStart
-from app.gateway.auth import is_loopback
 from app.gateway.greeting import address, greet, link
+from app.gateway.origin import is_loopback
 from app.gateway.serve import bind
 from app.gateway.tls import FOLDER, read_authority
 from app.gateway.tokens import TokenStore
