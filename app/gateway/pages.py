@@ -29,19 +29,20 @@ _POLICY = (
 )
 
 
-def page(title: str, body: str, *, status: int = 200, head: str = "") -> HTMLResponse:
-    """One page, without scripts; ``body`` and ``head`` are HTML."""
+def page(
+    title: str, body: str, *, status: int = 200, head: str = "", form: bool = False
+) -> HTMLResponse:
+    """One page, without scripts; ``body`` and ``head`` are HTML; ``form``: it has a form."""
     html = (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"{head}<title>{escape(title)}</title><style>{_STYLE}</style></head>\n"
         f"<body>{body}</body></html>\n"
     )
-    headers = {
-        "Content-Security-Policy": _POLICY,
+    headers = {"Content-Security-Policy": _POLICY}
+    if form:
         # Not "no-referrer", under which browsers send a form with "Origin: null".
-        "Referrer-Policy": "strict-origin",
-    }
+        headers["Referrer-Policy"] = "strict-origin"
     return HTMLResponse(html, status_code=status, headers=headers)
 
 
@@ -67,7 +68,7 @@ def sign_in_page(
         "<button>Sign in</button></form><p>Did the browser warn you of this page? "
         f'<a href="{prefix}/trust">How to make it trust this server</a></p></main>'
     )
-    return page("Farhand: sign in", body, status=status)
+    return page("Farhand: sign in", body, status=status, form=True)
 
 
 def confirm_page(token: str, *, prefix: str = "") -> HTMLResponse:
@@ -84,7 +85,7 @@ def confirm_page(token: str, *, prefix: str = "") -> HTMLResponse:
         f'<button autofocus>Sign in</button></form><p><a href="{prefix}/">Go on without it</a></p>'
         "</main>"
     )
-    return page("Farhand: sign in", body)
+    return page("Farhand: sign in", body, form=True)
 
 
 def again_page(path: str) -> HTMLResponse:
