@@ -82,7 +82,7 @@ class Gatekeeper:
         *,
         secure: bool,
         hosts: Callable[[], Sequence[str]] = tuple,
-        proxies: Sequence[Network] | None = None,
+        proxies: Sequence[Network | Literal["gateway"]] | None = None,
     ) -> None:
         self._tokens = tokens
         # __Host-: browsers take it over HTTPS alone, for this very host and all of its paths, so

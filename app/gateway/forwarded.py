@@ -3,12 +3,12 @@
 import ipaddress
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 from starlette.datastructures import Headers
 
 from app.errors import NotAllowed
-from app.gateway.machine import parse_address
+from app.gateway.machine import default_gateways, parse_address
 
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 
@@ -19,13 +19,16 @@ class Proxies:
     """The proxies in front of a server.
 
     Args:
-        networks: Who is answered. An address that stands there by itself is a proxy that is known;
-            a network says only from where a proxy may come.
+        addresses: Who is answered. An address that stands there by itself is a proxy that is known;
+            a network, loopback and ``gateway`` say only from where a proxy may come.
     """
 
-    def __init__(self, networks: Sequence[Network]) -> None:
-        self._networks = networks
-        self._known = [network for network in networks if network.num_addresses == 1]
+    def __init__(self, addresses: Sequence[Network | Literal["gateway"]]) -> None:
+        named = [each for each in addresses if each != "gateway"]
+        self._known = [each for each in named if each.num_addresses == 1 and not each.is_loopback]
+        self._networks = named
+        if len(named) < len(addresses):
+            self._networks = [*named, *map(ipaddress.ip_network, default_gateways())]
 
     def client(self, scope: Mapping[str, Any]) -> str:
         """Where a request comes from, as the proxy says.

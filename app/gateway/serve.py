@@ -22,6 +22,7 @@ from app.config import Settings
 from app.errors import CannotStart
 from app.gateway.app import create_app
 from app.gateway.front import SecureFront
+from app.gateway.given_token import with_given_token
 from app.gateway.greeting import greet
 from app.gateway.tls import LocalAuthority
 from app.gateway.tokens import TokenStore
@@ -40,7 +41,12 @@ UNSENT_BYTES = 128 * 1024
 LOG_CONFIG: dict[str, Any] = {
     "version": 1,
     "disable_existing_loggers": False,
-    "formatters": {"line": {"format": "%(asctime)s %(levelname)s %(message)s"}},
+    "formatters": {
+        "line": {
+            "()": "app.log_text.LineFormatter",
+            "format": "%(asctime)s %(levelname)s %(message)s",
+        }
+    },
     "handlers": {
         "stderr": {
             "class": "logging.StreamHandler",
@@ -231,6 +237,7 @@ def serve(settings: Settings) -> None:
         DatabaseBroken: the gesture database cannot be read.
     """
     logging.config.dictConfig(LOG_CONFIG)
+    settings = with_given_token(settings)
     # Two frames at once are better than one frame on two cores.
     cv2.setNumThreads(1)
     check_transport(settings)
