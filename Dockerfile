@@ -18,7 +18,7 @@ RUN useradd --system --uid 10001 --create-home farhand && install -d -m 0700 -o 
 COPY --from=build /opt/farhand /opt/farhand
 ENV PATH=/opt/farhand/bin:$PATH PYTHONUNBUFFERED=1 \
     FARHAND_DATA_DIR=/data FARHAND_HOST=0.0.0.0 FARHAND_PORT=8000 FARHAND_BEHIND_PROXY=true \
-    FARHAND_PROXY_ADDRESSES='["127.0.0.0/8", "::1", "172.16.0.0/12", "192.168.0.0/16", "10.0.0.0/8"]'
+    FARHAND_PROXY_ADDRESSES='["127.0.0.0/8", "::1", "gateway"]'
 USER farhand
 WORKDIR /data
 VOLUME /data

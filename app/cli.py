@@ -17,6 +17,9 @@ from pydantic import ValidationError
 from app.cli_gestures import draw_operator, draw_starter_set, enrol, gestures_app, settings_for
 from app.cli_tokens import tokens_app, trust
 from app.errors import FarhandError
+from app.log_text import LineFormatter
+
+log = logging.getLogger(__name__)
 
 app = typer.Typer(
     name="farhand",
@@ -43,7 +46,13 @@ def serve(
     port: Annotated[int | None, typer.Option(help="Port; 0 picks a free one.")] = None,
     data_dir: DataDir = None,
     token: Annotated[
-        str | None, typer.Option(help="Secret that opens the page and the API.")
+        str | None,
+        typer.Option(
+            help="Secret that opens the page and the API. Others see it in the list of processes."
+        ),
+    ] = None,
+    token_file: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="File that holds such a secret.")
     ] = None,
     tls_cert: Annotated[Path | None, typer.Option(help="Certificate chain (PEM).")] = None,
     tls_key: Annotated[Path | None, typer.Option(help="Private key (PEM).")] = None,
@@ -73,6 +82,7 @@ def serve(
     ] = None,
 ) -> None:
     """Start the server: the page, the API, the 3D view and a robot node."""
+    from app.gateway.given_token import IN_ARGUMENTS
     from app.gateway.serve import serve as run_server
 
     given: dict[str, Any] = {
@@ -80,6 +90,7 @@ def serve(
         "port": port,
         "data_dir": data_dir,
         "token": token,
+        "token_file": token_file,
         "tls_cert": tls_cert,
         "tls_key": tls_key,
         "behind_proxy": behind_proxy,
@@ -95,6 +106,8 @@ def serve(
         robot["profile"] = robot_profile
     if robot:
         given["robot"] = robot
+    if token is not None:
+        log.warning(IN_ARGUMENTS)
     run_server(settings_for(**given))
 
 
@@ -213,9 +226,9 @@ def doctor(data_dir: DataDir = None, port: int | None = None) -> None:
 
 def main() -> None:
     """Run the command line; turn this project's errors into one line and exit code 1."""
-    logging.basicConfig(
-        level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(levelname)s %(message)s"
-    )
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(LineFormatter("%(asctime)s %(levelname)s %(message)s"))
+    logging.basicConfig(level=logging.INFO, handlers=[handler])
     logging.getLogger("alembic").setLevel(logging.WARNING)
     try:
         app()

@@ -586,6 +586,9 @@ class Settings(BaseSettings):
     token: SecretStr | None = Field(
         default=None, description="secret that opens the page and the API; made when not given"
     )
+    token_file: Path | None = Field(
+        default=None, description="file that holds it, which nobody else can read"
+    )
     tls_cert: Path | None = Field(default=None, description="certificate chain (PEM) for HTTPS")
     tls_key: Path | None = Field(default=None, description="private key (PEM) of the certificate")
     behind_proxy: bool = Field(
@@ -593,11 +596,12 @@ class Settings(BaseSettings):
         description="a proxy in front serves HTTPS; allows plain HTTP off loopback, from "
         "proxy_addresses alone",
     )
-    proxy_addresses: tuple[IPvAnyNetwork, ...] = Field(
+    proxy_addresses: tuple[IPvAnyNetwork | Literal["gateway"], ...] = Field(
         default=(IPv4Network("127.0.0.0/8"), IPv6Network("::1/128")),
         min_length=1,
         description="addresses or networks of the proxy in front; nobody else is answered, and "
-        "its X-Forwarded-For is believed",
+        "the last entry of its X-Forwarded-For is believed; 'gateway' is this machine's way out, "
+        "by which a container is reached from its host",
     )
     root_path: str = Field(
         default="",

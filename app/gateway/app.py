@@ -5,11 +5,10 @@ import mimetypes
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
-from urllib.parse import parse_qs
 
 from fastapi import APIRouter, FastAPI, Request
 from starlette.middleware.gzip import GZipMiddleware
-from starlette.responses import FileResponse, RedirectResponse, Response
+from starlette.responses import FileResponse, Response
 from starlette.staticfiles import StaticFiles
 
 from app.config import Settings
@@ -28,23 +27,22 @@ from app.gateway import (
     rest_server,
     rest_settings,
     rest_timeline,
+    signing,
     trust,
     viser_proxy,
 )
 from app.gateway.auth import Gatekeeper, identity_of
 from app.gateway.errors import EVERYWHERE, error_response, install_error_handlers
-from app.gateway.guard import Guard, signed_out_page, too_many_response
+from app.gateway.guard import Guard, signed_out_page
 from app.gateway.hub import Hub, package_version
 from app.gateway.messages import CLIENT_MESSAGES
 from app.gateway.operator_ws import operator_socket
 from app.gateway.roles import check_messages, check_routes
-from app.gateway.throttle import TooManyGuesses
+from app.gateway.signing import sign_in_by_link
 from app.gateway.tls import LocalAuthority
 from app.gateway.tokens import TokenStore
 
 STATIC = Path(__file__).parents[1] / "static"
-MAX_SIGN_IN = 4096
-WRONG_TOKEN = "That token is not one of this server's."
 
 pages = APIRouter(include_in_schema=False)
 
@@ -53,46 +51,12 @@ pages = APIRouter(include_in_schema=False)
 async def index(request: Request, token: str | None = None) -> Response:
     """The page; with ``?token=`` sign in first; without any sign-in ask for the token."""
     if token is not None:
-        return _signed_in(request, token)
+        return sign_in_by_link(request, token)
     if identity_of(request.scope) is None:
         if "text/html" in request.headers.get("accept", ""):
             return signed_out_page(request.headers, request.app.state.settings.root_path, "/")
         return error_response(NotSignedIn("open the link that the server printed"))
     return FileResponse(STATIC / "index.html", headers={"Cache-Control": "no-cache"})
-
-
-@pages.post("/signin")
-async def sign_in(request: Request) -> Response:
-    """The sign-in page's form: ``token=...``, URL-encoded."""
-    body = b""
-    async for part in request.stream():
-        body += part
-        if len(body) > MAX_SIGN_IN:
-            return _wrong(request)
-    fields = parse_qs(body.decode("utf-8", "replace"))
-    return _signed_in(request, fields.get("token", [""])[0].strip())
-
-
-def _signed_in(request: Request, token: str) -> Response:
-    gatekeeper: Gatekeeper = request.app.state.gatekeeper
-    try:
-        cookie = gatekeeper.sign_in(token, request.scope["farhand.client"])
-    except TooManyGuesses as error:
-        if "text/html" in request.headers.get("accept", ""):
-            return _wrong(request, f"{error.message}.", error.status)
-        return too_many_response(error)
-    if cookie is None:
-        return _wrong(request)
-    answer = RedirectResponse(f"{request.app.state.settings.root_path}/", 303)
-    answer.headers["Set-Cookie"] = cookie
-    return answer
-
-
-def _wrong(request: Request, problem: str = WRONG_TOKEN, status: int = 401) -> Response:
-    if "text/html" in request.headers.get("accept", ""):
-        prefix = request.app.state.settings.root_path
-        return signed_out_page(request.headers, prefix, "/", problem, status)
-    return error_response(NotSignedIn("this token is not one of this server's"))
 
 
 def create_app(
@@ -146,6 +110,8 @@ def create_app(
         openapi_url=None,
         docs_url=None,
         redoc_url=None,
+        # It would answer with an address that it makes of the path and of the Host header.
+        redirect_slashes=False,
     )
     app.state.gatekeeper = gatekeeper
     app.state.authority = authority
@@ -154,6 +120,7 @@ def create_app(
     app.add_middleware(Guard, gatekeeper=gatekeeper, prefix=settings.root_path)
     for router in (
         pages,
+        signing.router,
         trust.router,
         rest_gestures.router,
         rest_galleries.router,

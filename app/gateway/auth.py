@@ -1,33 +1,42 @@
 """Who may come in: tokens as bearers for programs, and as cookies for browsers."""
 
-import asyncio
-import ipaddress
-import logging
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+import hmac
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from http.cookies import CookieError, SimpleCookie
-from typing import Any, Literal
-from urllib.parse import urlsplit
+from typing import Any, Literal, NamedTuple
 
 from starlette.datastructures import Headers
 
 from app.config import Settings
 from app.errors import NotAllowed, NotSignedIn, RequestError
-from app.gateway.machine import parse_address
-from app.gateway.roles import OPERATORS_ONLY, Access, Role, allows
-from app.gateway.throttle import Throttle
-from app.gateway.tokens import TokenStore, cookie_of, sha256
-
-log = logging.getLogger(__name__)
+from app.gateway.connections import Connections
+from app.gateway.fetch_metadata import is_foreign
+from app.gateway.forwarded import Network, Proxies
+from app.gateway.origin import cookie_in, host_name, is_loopback, same_host
+from app.gateway.page_secret import (
+    PageProof,
+    fragment,
+    page_secret,
+    parse_proof,
+    proof_of,
+    view_ticket,
+)
+from app.gateway.roles import OPERATORS_ONLY, Access, Proof, Role, allows
+from app.gateway.throttle import Throttle, TooManyGuesses
+from app.gateway.tokens import GIVEN, Token, TokenStore, cookie_of, sha256
 
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
-REVOKED_CHECK_S = 0.5
 SIGN_IN_FIRST = (
     "sign in first: send 'Authorization: Bearer TOKEN', or open the link that the server printed"
 )
 
-Credential = Literal["bearer", "cookie"]
+SHOW_THE_PAGE = (
+    "the cookie alone does not open this: only the page that was signed in has the other half "
+    "(header Farhand-Page); sign in anew, or send 'Authorization: Bearer TOKEN'"
+)
+
+Credential = Literal["bearer", "page", "ticket", "cookie"]
+"""A program's token; a cookie with the page's half; with a ticket for pictures; and by itself."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +47,8 @@ class Identity:
     """Id of the token."""
     role: Role
     credential: Credential
+    browser: str = ""
+    """What tells a browser from others with the same token; empty for programs."""
 
 
 def identity_of(scope: Mapping[str, Any]) -> Identity | None:
@@ -46,39 +57,13 @@ def identity_of(scope: Mapping[str, Any]) -> Identity | None:
     return found if isinstance(found, Identity) else None
 
 
-def is_loopback(host: str) -> bool:
-    """Whether an address to listen on reaches this machine alone."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
+class SignedIn(NamedTuple):
+    """What a browser is given."""
 
-
-def host_name(authority: str) -> str:
-    """The host of ``host:port``, lower case, without brackets; empty when there is none."""
-    try:
-        return urlsplit(f"//{authority}").hostname or ""
-    except ValueError:
-        return ""
-
-
-def same_host(origin: str, host: str, *, secure: bool = False) -> bool:
-    """Whether an ``Origin`` header names the host and port that the request was sent to.
-
-    The scheme has to be https where ``secure`` is set; elsewhere it is not compared, since a tunnel
-    that nobody told us of may end in front of us.
-    """
-    try:
-        parts = urlsplit(origin)
-        default = {"http": 80, "https": 443}.get(parts.scheme)
-        other = urlsplit(f"//{host}")
-        if default is None or not parts.hostname or (secure and parts.scheme != "https"):
-            return False
-        return (parts.hostname, parts.port or default) == (other.hostname, other.port or default)
-    except ValueError:
-        return False
+    cookie: str
+    """The value of ``Set-Cookie``."""
+    fragment: str
+    """For the end of the page's address: the half that the page keeps."""
 
 
 class Gatekeeper:
@@ -97,7 +82,7 @@ class Gatekeeper:
         *,
         secure: bool,
         hosts: Callable[[], Sequence[str]] = tuple,
-        proxies: Sequence[ipaddress.IPv4Network | ipaddress.IPv6Network] | None = None,
+        proxies: Sequence[Network | Literal["gateway"]] | None = None,
     ) -> None:
         self._tokens = tokens
         # __Host-: browsers take it over HTTPS alone, for this very host and all of its paths, so
@@ -105,7 +90,7 @@ class Gatekeeper:
         self.cookie_name = f"{'__Host-' if secure else ''}farhand_{tokens.server}"
         self._secure = secure
         self._hosts = hosts
-        self._proxies = proxies
+        self._proxies = None if proxies is None else Proxies(proxies)
         self.throttle = Throttle()
         self.connections = Connections(tokens)
 
@@ -132,10 +117,11 @@ class Gatekeeper:
             proxies=settings.proxy_addresses if settings.behind_proxy else None,
         )
 
-    def set_cookie_header(self, secret: str) -> str:
-        """The value of ``Set-Cookie`` that signs a browser in with this token."""
+    def set_cookie_header(self, secret: str | None) -> str:
+        """The value of ``Set-Cookie`` that signs a browser in with this token; None: out."""
+        value, age = (cookie_of(secret), "") if secret is not None else ("", "; Max-Age=0")
         secure = "; Secure" if self._secure else ""
-        return f"{self.cookie_name}={cookie_of(secret)}; Path=/; HttpOnly; SameSite=Strict{secure}"
+        return f"{self.cookie_name}={value}; Path=/; HttpOnly; SameSite=Strict{age}{secure}"
 
     def client(self, scope: Mapping[str, Any]) -> str:
         """Where a request comes from; behind a proxy, what the proxy says of it.
@@ -143,25 +129,9 @@ class Gatekeeper:
         Raises:
             NotAllowed: it did not come through the proxy.
         """
-        peer = str((scope.get("client") or ("",))[0])
-        if self._proxies is None:
-            return peer
-        if not self._is_proxy(peer):
-            raise NotAllowed(
-                "this server is reached through the proxy in front of it; if that is what you are, "
-                "start the server with --proxy-address and your address",
-                code="not_through_proxy",
-            )
-        forwarded = ",".join(Headers(scope=dict(scope)).getlist("x-forwarded-for")).split(",")
-        # The last entry is the proxy's own word; those before it are whatever the client sent.
-        for entry in reversed([part.strip() for part in forwarded if part.strip()]):
-            if not self._is_proxy(entry):
-                return entry[:64]
-        return peer
-
-    def _is_proxy(self, text: str) -> bool:
-        address = parse_address(text)
-        return address is not None and any(address in each for each in self._proxies or ())
+        if self._proxies is not None:
+            return self._proxies.client(scope)
+        return str((scope.get("client") or ("",))[0])
 
     def check_host(self, headers: Headers) -> None:
         """Refuse requests addressed to a foreign name (DNS rebinding).
@@ -180,23 +150,38 @@ class Gatekeeper:
                 host=host[:100],
             )
 
-    def sign_in(self, secret: str, client: str) -> str | None:
-        """The ``Set-Cookie`` value for a token that a person gave, or None for a wrong one.
+    def check_origin(self, headers: Headers) -> None:
+        """Refuse what a page that is not this server's sends.
+
+        Browsers add cookies by themselves, whoever's page asks; only ``Origin`` tells.
+
+        Raises:
+            NotAllowed: the page is another's, or there is no telling.
+        """
+        origin = headers.get("origin", "")
+        if not same_host(origin, headers.get("host", ""), secure=self._secure):
+            raise NotAllowed(
+                f"a request from {origin[:100] or 'an unknown origin'} may not use the cookie "
+                "of this server",
+                code="foreign_origin",
+                origin=origin[:100],
+            )
+
+    def sign_in(self, secret: str, client: str) -> SignedIn | None:
+        """What a browser is given for a token that a person gave, or None for a wrong one.
 
         Raises:
             TooManyGuesses: not looked at.
         """
-        digest = sha256(secret)
-        if not self.throttle.knows(client, digest):
-            self.throttle.check(client, digest)
-        if self._tokens.by_secret(secret) is None:
-            self.throttle.failed(client, digest)
+        token = self._by_secret(secret, client)
+        if token is None:
             return None
-        self.throttle.succeeded(client, digest)
-        return self.set_cookie_header(secret)
+        return SignedIn(self.set_cookie_header(secret), fragment(token.sha256))
 
-    def identify(self, headers: Headers, client: str = "") -> Identity | None:
+    def identify(self, headers: Headers, client: str = "", ticket: str = "") -> Identity | None:
         """Who sends a request, if that can be told.
+
+        ``ticket`` is what its address has of that kind.
 
         Raises:
             TooManyGuesses: the bearer token was not looked at.
@@ -205,27 +190,68 @@ class Gatekeeper:
         if authorization is not None:
             # A wrong bearer token is an error even beside a good cookie.
             scheme, _, given = authorization.partition(" ")
-            return self._bearer(given.strip(), client) if scheme.lower() == "bearer" else None
-        for header in headers.getlist("cookie"):
-            try:
-                morsel = SimpleCookie(header).get(self.cookie_name)
-            except CookieError:
-                continue
-            token = None if morsel is None else self._tokens.by_cookie(morsel.value)
-            if token is not None:
-                return Identity(token.id, token.role, "cookie")
-        return None
+            if scheme.lower() != "bearer":
+                return None
+            token = self._by_secret(given.strip(), client)
+            return None if token is None else Identity(token.id, token.role, "bearer")
+        value = cookie_in(headers, self.cookie_name)
+        if value is None or is_foreign(headers):
+            return None
+        token = self._by_cookie(value, client)
+        if token is None:
+            return None
+        proof = proof_of(headers)
+        if proof is not None and self._fits(proof, page_secret(token.sha256), client):
+            return Identity(token.id, token.role, "page", proof.browser)
+        shown = parse_proof(ticket)
+        if shown is not None and self._fits(shown, view_ticket(token.sha256), client):
+            return Identity(token.id, token.role, "ticket", shown.browser)
+        return Identity(token.id, token.role, "cookie")
 
-    def _bearer(self, secret: str, client: str) -> Identity | None:
-        digest = sha256(secret)
+    def token_of(self, identity: Identity) -> Token | None:
+        """The token by which somebody came in, if it is still good."""
+        return self._tokens.by_id(identity.token)
+
+    def _by_secret(self, secret: str, client: str) -> Token | None:
+        """The token itself, if it is right.
+
+        Raises:
+            TooManyGuesses: it was not looked at.
+        """
+        token = self._tokens.by_secret(secret)
+        return self._judged(token, sha256(secret), client)
+
+    def _by_cookie(self, value: str, client: str) -> Token | None:
+        """The token of a cookie. Where one too many was wrong, an unknown one is none."""
+        try:
+            return self._judged(self._tokens.by_cookie(value), sha256(value), client)
+        except TooManyGuesses:
+            return None
+
+    def _judged(self, token: Token | None, digest: str, client: str) -> Token | None:
+        """Count what was wrong, and look at nothing more of an address that was wrong too often.
+
+        A token made here is 256 random bits, which nobody finds by guessing: a right one is let in
+        whatever others at the same address sent. One that a person chose is not looked at then.
+
+        Raises:
+            TooManyGuesses: with the seconds to wait.
+        """
+        if token is not None and token.id != GIVEN:
+            return token
         if not self.throttle.knows(client, digest):
             self.throttle.check(client, digest)
-        token = self._tokens.by_secret(secret)
         if token is None:
             self.throttle.failed(client, digest)
             return None
         self.throttle.succeeded(client, digest)
-        return Identity(token.id, token.role, "bearer")
+        return token
+
+    def _fits(self, proof: PageProof, wanted: str, client: str) -> bool:
+        if hmac.compare_digest(proof.secret, wanted):
+            return True
+        self.throttle.failed(client, sha256(proof.secret))
+        return False
 
     def admit(
         self,
@@ -234,55 +260,34 @@ class Gatekeeper:
         *,
         websocket: bool,
         access: Access = "signed in",
+        proof: Proof = "page",
         client: str = "",
+        ticket: str = "",
     ) -> Identity:
         """Let a request in.
 
+        Args:
+            headers: Its headers.
+            method: Its method.
+            websocket: Whether it is a WebSocket's handshake.
+            access: Who may.
+            proof: What a browser has to show beside its cookie.
+            client: Where it comes from.
+            ticket: What its address has of that kind.
+
         Raises:
-            NotSignedIn: no token or cookie, or a wrong one.
+            NotSignedIn: no token or cookie, or a wrong one, or only half of what is needed.
             NotAllowed: a cookie came from another site's page, or the role may not do this.
             TooManyGuesses: too many wrong tokens came from there.
         """
-        identity = self.identify(headers, client)
+        by_cookie = "authorization" not in headers and cookie_in(headers, self.cookie_name)
+        if by_cookie and (websocket or method not in SAFE_METHODS):
+            self.check_origin(headers)
+        identity = self.identify(headers, client, ticket if proof == "ticket" else "")
         if identity is None:
             raise NotSignedIn(SIGN_IN_FIRST)
-        if identity.credential == "cookie" and (websocket or method not in SAFE_METHODS):
-            # Browsers add cookies by themselves, whoever's page asks; only Origin tells.
-            origin = headers.get("origin", "")
-            if not same_host(origin, headers.get("host", ""), secure=self._secure):
-                raise NotAllowed(
-                    f"a request from {origin[:100] or 'an unknown origin'} may not use the cookie "
-                    "of this server",
-                    code="foreign_origin",
-                    origin=origin[:100],
-                )
+        if identity.credential == "cookie" and proof != "cookie":
+            raise NotSignedIn(SHOW_THE_PAGE)
         if not allows(access, identity.role):
             raise NotAllowed(OPERATORS_ONLY)
         return identity
-
-
-class Connections:
-    """What is open now, by token, so that it ends when the token does."""
-
-    def __init__(self, tokens: TokenStore) -> None:
-        self._tokens = tokens
-        self._open: dict[Callable[[], None], str] = {}
-
-    @contextmanager
-    def kept(self, identity: Identity, end: Callable[[], None]) -> Iterator[None]:
-        """Meanwhile ``end`` is called when the token has run out or was revoked."""
-        self._open[end] = identity.token
-        try:
-            yield
-        finally:
-            self._open.pop(end, None)
-
-    async def watch(self) -> None:
-        """End what has lost its token, for ever."""
-        while True:
-            await asyncio.sleep(REVOKED_CHECK_S)
-            alive = {id: self._tokens.is_alive(id) for id in set(self._open.values())}
-            for end, id in tuple(self._open.items()):
-                if not alive[id]:
-                    log.info("a connection is closed: its token %s opens nothing any more", id)
-                    end()

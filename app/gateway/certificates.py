@@ -1,7 +1,10 @@
 """Making and reading certificates: X.509, without any file.
 
-An authority may certify its machine's names and private addresses alone (name constraints, RFC
-5280 section 4.2.1.10, critical): whoever steals its key cannot play a bank to those who trust it.
+An authority may certify this machine's own names, and private addresses, alone (name constraints,
+RFC 5280 section 4.2.1.10, critical): whoever steals its key cannot play a bank, or the printer of
+the same network, to those who trust it. Of addresses it may certify all private ones and not only
+today's: a router gives out others every now and then, and each new authority would have to be
+trusted by people anew, who would learn to do that without comparing.
 """
 
 import datetime
@@ -23,8 +26,8 @@ LEAF_DAYS = 90
 BACKDATED = datetime.timedelta(days=1)
 """Valid before now, for laptops whose clock is late."""
 
-PRIVATE_DOMAINS = ("localhost", "local", "home.arpa", "internal")
-"""Names that nobody owns on the internet (RFC 6761, 6762, 8375; ICANN's .internal)."""
+PRIVATE_DOMAINS = ("local", "home.arpa", "internal")
+"""Domains that nobody owns on the internet (RFC 6762, 8375; ICANN's .internal)."""
 PRIVATE_NETWORKS = tuple(
     ipaddress.ip_network(text)
     for text in (
@@ -69,7 +72,10 @@ def public_part(certificate: x509.Certificate) -> Public:
 
 
 def make_authority(names: Names, now: datetime.datetime) -> Issued:
-    """A certificate authority that may certify ``names``, private names and private addresses."""
+    """A certificate authority that may certify ``names`` and private addresses.
+
+    Also this machine's name in the private domains, where a router may put it later.
+    """
     key = ec.generate_private_key(ec.SECP256R1())
     name = x509.Name(
         [
@@ -81,9 +87,10 @@ def make_authority(names: Names, now: datetime.datetime) -> Issued:
             ),
         ]
     )
-    own = [n for n in names.dns if not _is_below(n, PRIVATE_DOMAINS)]
+    short = [n for n in names.dns if "." not in n and n != "localhost"]
+    own = ("localhost", *names.dns, *(f"{n}.{domain}" for n in short for domain in PRIVATE_DOMAINS))
     public = [_around(a) for a in names.addresses if not any(a in net for net in PRIVATE_NETWORKS)]
-    permitted: list[x509.GeneralName] = [x509.DNSName(n) for n in (*PRIVATE_DOMAINS, *own)]
+    permitted: list[x509.GeneralName] = [x509.DNSName(n) for n in dict.fromkeys(own)]
     permitted += [x509.IPAddress(n) for n in (*PRIVATE_NETWORKS, *dict.fromkeys(public))]
     certificate = (
         x509.CertificateBuilder()
@@ -153,8 +160,9 @@ def constraints(
     )
 
 
-def _is_below(name: str, domains: tuple[str, ...]) -> bool:
-    return any(name == domain or name.endswith(f".{domain}") for domain in domains)
+def wide_domains(authority: x509.Certificate) -> list[str]:
+    """The domains of other machines that an authority made by an earlier version may certify."""
+    return [name for name in constraints(authority)[0] if name in PRIVATE_DOMAINS]
 
 
 def _around(address: Address) -> ipaddress.IPv4Network | ipaddress.IPv6Network:

@@ -6,13 +6,15 @@ import logging
 import time
 from http import HTTPStatus
 
-from starlette.datastructures import Headers, MutableHeaders
+from starlette.datastructures import Headers, MutableHeaders, QueryParams
 from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.errors import NotAllowed, NotFound, NotSignedIn, RequestError
 from app.gateway.auth import Gatekeeper, Identity
 from app.gateway.errors import error_body, error_response, unexpected_response
+from app.gateway.fetch_metadata import is_foreign
+from app.gateway.page_secret import hide_proof
 from app.gateway.pages import again_page, sign_in_page
 from app.gateway.roles import WEBSOCKET, find
 from app.gateway.throttle import TooManyGuesses
@@ -72,6 +74,7 @@ class Guard:
         websocket = scope["type"] == "websocket"
         method: str = WEBSOCKET if websocket else scope["method"]
         status = 0
+        protocol: str | None = None
 
         async def send_on(message: Message) -> None:
             nonlocal status
@@ -80,11 +83,14 @@ class Guard:
                 _add_headers(message, path)
             elif message["type"] == "websocket.accept":
                 status = 101
+                if message.get("subprotocol") is None and protocol is not None:
+                    message = {**message, "subprotocol": protocol}
             await send(message)
 
         try:
             refusal, identity = self._judge(scope, method, path)
             scope["farhand.identity"] = identity
+            protocol = hide_proof(scope)
             if refusal is None:
                 try:
                     await self._pass(scope, receive, send_on, identity)
@@ -135,14 +141,21 @@ class Guard:
             client = self._gatekeeper.client(scope)
             scope["farhand.client"] = client
             self._gatekeeper.check_host(headers)
+            ticket = ""
+            if found.proof == "ticket":
+                ticket = QueryParams(scope.get("query_string", b"")).get("ticket", "")
             if found.access == "anyone":
-                return None, self._gatekeeper.identify(headers, client)
+                known = self._gatekeeper.identify(headers, client)
+                half = known is not None and known.credential == "cookie"
+                return None, None if half and found.proof != "cookie" else known
             identity = self._gatekeeper.admit(
                 headers,
                 method,
                 websocket=websocket,
                 access=found.access or "signed in",
+                proof=found.proof,
                 client=client,
+                ticket=ticket,
             )
         except NotSignedIn as error:
             if not websocket and method == "GET" and "text/html" in headers.get("accept", ""):
@@ -216,10 +229,11 @@ def signed_out_page(
 ) -> Response:
     """What a signed-out browser sees.
 
-    A link on another site's page brings no SameSite=Strict cookie even when there is one; one
-    reload of our own page does. After that, or without the link, there is the token to ask for.
+    A link on another site's page brings no SameSite=Strict cookie even when there is one, and that
+    of a page on another port is not looked at; one reload of our own page is. After that, or
+    without the link, there is the token to ask for.
     """
-    if headers.get("sec-fetch-site") == "cross-site" and problem is None:
+    if is_foreign(headers) and problem is None:
         return again_page(prefix + path)
     return sign_in_page(problem, prefix=prefix, status=status)
 

@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from app.errors import Invalid
 from app.gateway.errors import describe_validation
+from app.gateway.unicode_text import NotUnicode, check_unicode
 from app.gateway.uploads import UnsupportedMedia
 from app.link.actions import ACTION, Action
 
@@ -48,9 +49,13 @@ def parse_json(text: str | bytes, what: str) -> Any:
         raise ValueError(f"{name} is not a JSON number")
 
     try:
-        return json.loads(text, parse_constant=no_constant)
+        found = json.loads(text, parse_constant=no_constant)
+        check_unicode(found)
+    except NotUnicode as error:
+        raise Invalid(f"{what}: {error}", field=what) from None
     except (ValueError, RecursionError) as error:
         raise Invalid(f"{what} is not JSON: {error}"[:300], field=what) from None
+    return found
 
 
 def parse_action(value: Any) -> Action:

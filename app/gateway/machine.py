@@ -4,6 +4,7 @@ import ipaddress
 import re
 import socket
 from collections.abc import Iterable
+from pathlib import Path
 from typing import NamedTuple
 
 import psutil
@@ -49,6 +50,20 @@ def interface_addresses() -> frozenset[Address]:
                     continue
                 found.add(address)
     return frozenset(found)
+
+
+def default_gateways(table: Path = Path("/proc/net/route")) -> tuple[Address, ...]:
+    """Where this machine sends what is for elsewhere (IPv4); in a container, its host.
+
+    Empty where the system has no such table.
+    """
+    try:
+        rows = [line.split() for line in table.read_text().splitlines()[1:]]
+    except OSError:
+        return ()
+    found = (row[2] for row in rows if len(row) > 2 and row[1] == "00000000" != row[2])
+    # In the byte order of the machine, which is the lowest byte first wherever Farhand runs.
+    return tuple(ipaddress.IPv4Address(bytes.fromhex(each)[::-1]) for each in found)
 
 
 def host_names() -> frozenset[str]:

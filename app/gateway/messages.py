@@ -11,7 +11,9 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from app.errors import FarhandError, MessageRefused
 from app.gateway.errors import describe_validation
+from app.gateway.unicode_text import check_unicode
 from app.link.actions import HeldAction
+from app.link.numbers import Flag, Real, Whole
 
 MAX_TEXT = 4096
 """Characters of a client's text message."""
@@ -56,7 +58,7 @@ class TakeControl(_ClientMessage):
     """Become the one who drives; with ``takeover`` also when somebody else does."""
 
     type: Literal["take_control"]
-    takeover: bool = False
+    takeover: Flag = False
 
 
 class Plain(_ClientMessage):
@@ -85,15 +87,15 @@ class View(_ClientMessage):
     """Ask for masks and templates in the ``frame`` messages, or for none."""
 
     type: Literal["view"]
-    detail: bool
-    glass: bool = Field(default=False, description="with detail: every step between, too")
+    detail: Flag
+    glass: Flag = Field(default=False, description="with detail: every step between, too")
 
 
 class Speed(_ClientMessage):
     """The part of the ordinary speed at which this session wants to drive."""
 
     type: Literal["speed"]
-    scale: float = Field(ge=0.05, le=1.0)
+    scale: Real = Field(ge=0.05, le=1.0)
 
 
 class Picture(_ClientMessage):
@@ -101,18 +103,18 @@ class Picture(_ClientMessage):
 
     type: Literal["picture"]
     camera: Literal["wrist", "scene"]
-    tick: int = Field(ge=0, description="of the state that the picture shows, ms")
+    tick: Whole = Field(ge=0, description="of the state that the picture shows, ms")
 
 
 class Jog(_ClientMessage):
     """What a key, a button or a gamepad asks for while it is held; sent over and over."""
 
     type: Literal["jog"]
-    hold: int = Field(ge=0, lt=2**53, description="number of this press: rises with each")
+    hold: Whole = Field(ge=0, lt=2**53, description="number of this press: rises with each")
     action: HeldAction | None = Field(description="null: nothing is held, and the way is alive")
-    scale: float = Field(default=1.0, ge=0.05, le=1.0, description="part of the session's speed")
-    tick: int = Field(ge=1, description="newest server tick that the client has seen, ms")
-    at: float | None = Field(
+    scale: Real = Field(default=1.0, ge=0.05, le=1.0, description="part of the session's speed")
+    tick: Whole = Field(ge=1, description="newest server tick that the client has seen, ms")
+    at: Real | None = Field(
         default=None, ge=0, lt=1e15, description="when it is sent, ms on the client's own clock"
     )
 
@@ -121,7 +123,7 @@ class Ping(_ClientMessage):
     """Answered with ``pong``."""
 
     type: Literal["ping"]
-    t: float
+    t: Real
 
 
 ClientMessage = Annotated[
@@ -150,6 +152,7 @@ def parse_client_message(text: str) -> ClientMessage:
         )
     try:
         value = json.loads(text, parse_constant=_no_constant)
+        check_unicode(value)
     except (ValueError, RecursionError) as error:
         raise MessageRefused(
             f"the text message is not JSON: {error}"[:300], code="message_not_json"

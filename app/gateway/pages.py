@@ -4,6 +4,7 @@ import base64
 import hashlib
 from html import escape
 from typing import Any
+from urllib.parse import quote
 
 from starlette.responses import HTMLResponse
 
@@ -28,15 +29,30 @@ _POLICY = (
 )
 
 
-def page(title: str, body: str, *, status: int = 200, head: str = "") -> HTMLResponse:
-    """One page, without scripts; ``body`` and ``head`` are HTML."""
+def page(
+    title: str, body: str, *, status: int = 200, head: str = "", form: bool = False
+) -> HTMLResponse:
+    """One page, without scripts; ``body`` and ``head`` are HTML; ``form``: it has a form."""
     html = (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"{head}<title>{escape(title)}</title><style>{_STYLE}</style></head>\n"
         f"<body>{body}</body></html>\n"
     )
-    return HTMLResponse(html, status_code=status, headers={"Content-Security-Policy": _POLICY})
+    headers = {"Content-Security-Policy": _POLICY}
+    if form:
+        # Not "no-referrer", under which browsers send a form with "Origin: null".
+        headers["Referrer-Policy"] = "strict-origin"
+    return HTMLResponse(html, status_code=status, headers=headers)
+
+
+def own_path(path: str) -> str:
+    r"""A path as a browser has to be sent to it, so that it stays on this server.
+
+    ``//host`` names another host, and so does ``/\\host``, since browsers read a backslash as a
+    slash; both begin with one slash here, and everything but the characters of paths is escaped.
+    """
+    return "/" + quote(path.lstrip("/\\"), safe="/~!$&'()*+,;=:@")
 
 
 def sign_in_page(
@@ -52,12 +68,29 @@ def sign_in_page(
         "<button>Sign in</button></form><p>Did the browser warn you of this page? "
         f'<a href="{prefix}/trust">How to make it trust this server</a></p></main>'
     )
-    return page("Farhand: sign in", body, status=status)
+    return page("Farhand: sign in", body, status=status, form=True)
+
+
+def confirm_page(token: str, *, prefix: str = "") -> HTMLResponse:
+    """Asks who came by a link on another site's page whether to sign in; status 200.
+
+    Else that page could sign somebody in as another person, or use up their tries.
+    """
+    body = (
+        '<main class="narrow"><h1>Farhand</h1>'
+        "<p>A link on another page leads here. Sign in with it only if you trust who gave it to "
+        "you: this browser is then signed in with its token, and with no other.</p>"
+        f'<form method="post" action="{prefix}/signin">'
+        f'<input name="token" type="hidden" value="{escape(token, quote=True)}">'
+        f'<button autofocus>Sign in</button></form><p><a href="{prefix}/">Go on without it</a></p>'
+        "</main>"
+    )
+    return page("Farhand: sign in", body, form=True)
 
 
 def again_page(path: str) -> HTMLResponse:
     """Asks for the same page once more, now from this site; status 401."""
-    target = escape(path, quote=True)
+    target = escape(own_path(path), quote=True)
     head = f'<meta http-equiv="refresh" content="0;url={target}">'
     body = f'<main class="narrow"><p><a href="{target}">Go on to Farhand</a></p></main>'
     return page("Farhand", body, status=401, head=head)

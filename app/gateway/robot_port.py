@@ -6,12 +6,9 @@ the node is away: it is offline then, and comes back.
 
 import contextlib
 import logging
-import shutil
-import tempfile
 import threading
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Protocol
 
 from app.config import DEFAULT_PROFILE, Settings
@@ -31,6 +28,7 @@ from app.link.messages import (
 )
 from app.link.session import socket_endpoint
 from app.robot.models import model_assets
+from app.scratch import ScratchFolder, remove_left_behind
 
 log = logging.getLogger(__name__)
 
@@ -75,7 +73,7 @@ class RobotPort:
         self._link: GatewayEnd | None = None
         self._link_error: str | None = None
         self._ending = threading.Event()
-        self._folder: Path | None = None
+        self._folder: ScratchFolder | None = None
         self._process: NodeProcess | None = None
         self.stop_memory = StopMemory(settings.data_dir / f"stop-{self.id}.remembered")
         endpoint = settings.robot.endpoint
@@ -84,11 +82,12 @@ class RobotPort:
             model_assets(profile)  # a wrong one is told now, in a line, and not by a node that dies
         if settings.robot.spawn:
             try:
-                # mkdtemp: mode 0700, so that nobody else reaches the socket in it.
-                self._folder = Path(tempfile.mkdtemp(prefix="farhand-"))
+                remove_left_behind()
+                # Of mode 0700, so that nobody else reaches the socket in it.
+                self._folder = ScratchFolder()
             except OSError as error:
                 raise CannotStart(f"no private folder for the link: {error}") from error
-            endpoint = socket_endpoint(self._folder / "link")
+            endpoint = socket_endpoint(self._folder.path / "link")
             latch = settings.data_dir / f"stop-{self.id}.latch"
             self._process = NodeProcess(
                 node_command(self.id, endpoint, latch, profile),
@@ -122,7 +121,7 @@ class RobotPort:
         if self._process is not None:
             self._process.close()
         if self._folder is not None:
-            shutil.rmtree(self._folder, ignore_errors=True)
+            self._folder.close()
         self.stop_memory.close()
 
     # What is known

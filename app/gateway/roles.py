@@ -17,12 +17,16 @@ Role = Literal["operator", "observer"]
 Access = Literal["anyone", "signed in", "operator"]
 """Who may: anyone; operators and observers; operators alone."""
 
+Proof = Literal["cookie", "ticket", "page"]
+"""What a browser has to show: its cookie alone; a ticket beside it; or the half its page holds."""
+
 WEBSOCKET = "WEBSOCKET"
 """Stands for the method of a WebSocket's handshake."""
 
 ROUTES: dict[str, Access] = {
     # The door
     "GET /": "anyone",  # shows the page to who is signed in, and asks others to sign in
+    "GET /signin": "anyone",
     "POST /signin": "anyone",
     "GET /api/health": "anyone",  # one word; the details to who is signed in
     "GET /trust": "anyone",
@@ -30,6 +34,9 @@ ROUTES: dict[str, Access] = {
     "GET /trust/ca.crt": "anyone",
     # Stopping
     "POST /api/robots/{id}/stop": "signed in",
+    # Oneself
+    "GET /api/session": "signed in",
+    "POST /api/sign-out": "signed in",
     # Looking
     "GET /static/{path:path}": "signed in",
     "HEAD /static/{path:path}": "signed in",
@@ -84,6 +91,24 @@ ROUTES: dict[str, Access] = {
     "DELETE /api/robots/{id}/dry-run/{view}": "operator",
 }
 
+PROOFS: dict[str, Proof] = {
+    # The page's own files, which everybody who has Farhand has.
+    "GET /": "cookie",
+    "GET /static/{path:path}": "cookie",
+    "HEAD /static/{path:path}": "cookie",
+    "GET /docs": "cookie",
+    "GET /openapi.json": "cookie",
+    "GET /viser": "cookie",
+    "GET /viser/{path:path}": "cookie",
+    # What a page shows by its address alone.
+    "GET /api/gestures/{id}/template.png": "ticket",
+    "GET /api/timeline/{id}/picture.jpg": "ticket",
+    "GET /api/timeline/{id}/template.png": "ticket",
+    "WEBSOCKET /viser": "ticket",
+    "WEBSOCKET /viser/": "ticket",
+}
+"""What opens less than the page's half does (:mod:`app.gateway.page_secret`); all else needs it."""
+
 FRAME = "frame"
 """Stands for a webcam frame, which has no type."""
 OPERATORS_ONLY = "an observer looks and can stop the robot; this needs an operator"
@@ -125,6 +150,7 @@ class _Row(NamedTuple):
     method: str
     path: str
     access: Access
+    proof: Proof
     regex: re.Pattern[str]
 
 
@@ -133,7 +159,7 @@ def _rows() -> tuple[_Row, ...]:
     for key, access in ROUTES.items():
         method, path = key.split(" ", 1)
         # The router's own way of reading a path, so that both find the same row.
-        rows.append(_Row(method, path, access, compile_path(path)[0]))
+        rows.append(_Row(method, path, access, PROOFS.get(key, "page"), compile_path(path)[0]))
     # /api/gestures/check is not a gesture: rows without names in braces go first.
     return tuple(sorted(rows, key=lambda row: "{" in row.path))
 
@@ -148,14 +174,18 @@ class Found(NamedTuple):
     """None: no such route, or not by this method."""
     methods: tuple[str, ...]
     """Methods that the path has."""
+    proof: Proof
+    """What a browser has to show."""
 
 
 def find(method: str, path: str) -> Found:
     """Look a request up. ``path`` is that below the prefix that a proxy adds."""
     fitting = [row for row in _ROWS if row.regex.match(path)]
-    access = next((row.access for row in fitting if row.method == method), None)
+    row = next((row for row in fitting if row.method == method), None)
     methods = tuple(sorted({row.method for row in fitting} - {WEBSOCKET}))
-    return Found(access, methods)
+    if row is None:
+        return Found(None, methods, "page")
+    return Found(row.access, methods, row.proof)
 
 
 def routes_of(routes: Iterable[Any], prefix: str = "") -> Iterator[str]:

@@ -22,6 +22,7 @@ from app.config import Settings
 from app.errors import CannotStart
 from app.gateway.app import create_app
 from app.gateway.front import SecureFront
+from app.gateway.given_token import with_given_token
 from app.gateway.greeting import greet
 from app.gateway.tls import LocalAuthority
 from app.gateway.tokens import TokenStore
@@ -244,6 +245,7 @@ def serve(settings: Settings) -> None:
     for name, level in LOG_LEVELS.items():
         logging.getLogger(name).setLevel(level)
     keep_private()
+    settings = with_given_token(settings)
     # Two frames at once are better than one frame on two cores.
     cv2.setNumThreads(1)
     with logs.written_apart():

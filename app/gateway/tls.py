@@ -29,6 +29,7 @@ from app.gateway.certificates import (
     make_authority,
     make_leaf,
     public_part,
+    wide_domains,
 )
 from app.gateway.machine import Names
 
@@ -60,6 +61,7 @@ class LocalAuthority:
         self._ask_names = names
         self._now = now
         self._left_out: frozenset[str] = frozenset()
+        self._told_wide = False
         self.server_file = folder / SERVER_FILE
         self.names = Names((), ())
         """What the server's certificate holds."""
@@ -103,6 +105,16 @@ class LocalAuthority:
             _write(path, issued.pem())
             log.info("made a certificate authority for this machine in %s", self._folder)
         self.public = public_part(issued.certificate)
+        if (wide := wide_domains(issued.certificate)) and not self._told_wide:
+            # It was trusted as it is; only a person decides to have another one trusted.
+            self._told_wide = True
+            log.warning(
+                "the authority in %s was made by an earlier version and may certify every name "
+                "below %s; to have one for this machine's names alone delete the folder, start "
+                "again, and let the browsers trust the new authority in place of the old one",
+                self._folder,
+                ", ".join(wide),
+            )
         return issued
 
     def _serve_by(self, authority: Issued) -> bool:

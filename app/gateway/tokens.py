@@ -172,9 +172,13 @@ class TokenStore:
         """The token that this cookie was made for."""
         return self._alive(self._current(self._cookies).get(sha256(value)))
 
+    def by_id(self, id: str) -> Token | None:
+        """The token with this id, if it still opens anything."""
+        return self._alive(self._current(self._ids).get(id))
+
     def is_alive(self, id: str) -> bool:
         """Whether a token still opens anything."""
-        return self._alive(self._current(self._ids).get(id)) is not None
+        return self.by_id(id) is not None
 
     def list(self) -> tuple[Token, ...]:
         """Tokens of the file, also those that have run out.

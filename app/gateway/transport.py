@@ -6,8 +6,8 @@ import ssl
 
 from app.config import Settings
 from app.errors import CannotStart
-from app.gateway.auth import is_loopback
 from app.gateway.machine import machine_names
+from app.gateway.origin import is_loopback
 from app.gateway.roles import ROUTES
 from app.gateway.tls import FOLDER, LocalAuthority
 

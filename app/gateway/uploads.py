@@ -8,6 +8,7 @@ from starlette.types import Message
 
 from app.config import GatewaySettings
 from app.errors import Invalid, RequestError, TooLarge
+from app.gateway.unicode_text import NotUnicode, check_unicode
 from app.gestures.records import SHARED
 
 MAX_IMAGES = 50
@@ -132,6 +133,7 @@ async def read_upload(
     limited = _limited(request, limit)
     async with limited.form(max_files=most_images, max_fields=8) as form:
         for name, value in form.multi_items():
+            _check_text(name, "the name of a field")
             if isinstance(value, UploadFile):
                 if name != image_field:
                     raise Invalid(f"files belong in {image_field!r}, not in {name!r}", field=name)
@@ -144,10 +146,19 @@ async def read_upload(
             elif name in fields:
                 raise Invalid(f"the field {name!r} was given twice", field=name)
             else:
+                _check_text(value, name)
                 fields[name] = value
     if sum(map(len, images)) > limit:
         raise _too_large(limit)
     return Upload(fields, images)
+
+
+def _check_text(text: str, what: str) -> None:
+    """Some encodings that a part may name bring what is no character."""
+    try:
+        check_unicode(text)
+    except NotUnicode as error:
+        raise Invalid(f"{what}: {error}", field=what) from None
 
 
 async def read_image(request: Request, limit: int) -> Upload:

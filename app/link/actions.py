@@ -9,6 +9,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
 
+from app.link.numbers import Real, Whole
+
 MAX_JOINT_SPEED = 4.3
 """rad/s; the fastest joint of the PUMA 560 (joint 5) turns at 241 degrees/s."""
 MAX_LINEAR_SPEED = 1.0
@@ -31,7 +33,7 @@ class _Action(BaseModel):
 
 
 Duration = Annotated[
-    float | None,
+    Real | None,
     Field(
         default=None,
         gt=0,
@@ -39,18 +41,18 @@ Duration = Annotated[
         description="s; how long to move. Only inside a sequence, where it is required.",
     ),
 ]
-LinearSpeed = Annotated[float, Field(ge=-MAX_LINEAR_SPEED, le=MAX_LINEAR_SPEED)]
-AngularSpeed = Annotated[float, Field(ge=-MAX_ANGULAR_SPEED, le=MAX_ANGULAR_SPEED)]
-Offset = Annotated[float, Field(ge=-MAX_OFFSET, le=MAX_OFFSET)]
-Turn = Annotated[float, Field(ge=-3.1, le=3.1)]
+LinearSpeed = Annotated[Real, Field(ge=-MAX_LINEAR_SPEED, le=MAX_LINEAR_SPEED)]
+AngularSpeed = Annotated[Real, Field(ge=-MAX_ANGULAR_SPEED, le=MAX_ANGULAR_SPEED)]
+Offset = Annotated[Real, Field(ge=-MAX_OFFSET, le=MAX_OFFSET)]
+Turn = Annotated[Real, Field(ge=-3.1, le=3.1)]
 
 
 class JogJoint(_Action):
     """Turn one joint at a constant speed while the gesture is held."""
 
     type: Literal["jog_joint"] = "jog_joint"
-    joint: int = Field(ge=1, le=MAX_JOINTS, description="1 is the joint at the base.")
-    velocity: float = Field(ge=-MAX_JOINT_SPEED, le=MAX_JOINT_SPEED, description="rad/s")
+    joint: Whole = Field(ge=1, le=MAX_JOINTS, description="1 is the joint at the base.")
+    velocity: Real = Field(ge=-MAX_JOINT_SPEED, le=MAX_JOINT_SPEED, description="rad/s")
     duration: Duration = None
 
 
@@ -72,8 +74,8 @@ class TurnJoint(_Action):
     """Turn one joint by an exact angle. Ends there; letting go before stops it on the way."""
 
     type: Literal["turn_joint"] = "turn_joint"
-    joint: int = Field(ge=1, le=MAX_JOINTS, description="1 is the joint at the base.")
-    angle: float = Field(ge=-6.3, le=6.3, description="rad, relative to where the joint is")
+    joint: Whole = Field(ge=1, le=MAX_JOINTS, description="1 is the joint at the base.")
+    angle: Real = Field(ge=-6.3, le=6.3, description="rad, relative to where the joint is")
 
 
 class MoveLinear(_Action):
@@ -90,7 +92,7 @@ class MoveLinear(_Action):
     rotation: tuple[Turn, Turn, Turn] = Field(
         default=(0.0, 0.0, 0.0), description="rotation vector in rad, in the frame"
     )
-    speed: float | None = Field(
+    speed: Real | None = Field(
         default=None, gt=0, le=MAX_LINEAR_SPEED, description="m/s; the robot's own unless given"
     )
 
@@ -106,8 +108,8 @@ class Gripper(_Action):
     """Open or close the gripper to a width."""
 
     type: Literal["gripper"] = "gripper"
-    width: float = Field(ge=0.0, le=0.2, description="m between the fingers; 0 is closed")
-    force: float | None = Field(
+    width: Real = Field(ge=0.0, le=0.2, description="m between the fingers; 0 is closed")
+    force: Real | None = Field(
         default=None, gt=0, le=200, description="N of each finger; the robot's own unless given"
     )
 
@@ -128,7 +130,7 @@ class Wait(_Action):
     """Stand still for a while. Only inside a sequence."""
 
     type: Literal["wait"] = "wait"
-    duration: float = Field(gt=0, le=60, description="s")
+    duration: Real = Field(gt=0, le=60, description="s")
 
 
 _SimpleStep = Annotated[
@@ -141,7 +143,7 @@ class Repeat(_Action):
     """Do some steps several times over. Only inside a sequence, and not in another repeat."""
 
     type: Literal["repeat"] = "repeat"
-    times: int = Field(ge=1, le=MAX_REPEATS)
+    times: Whole = Field(ge=1, le=MAX_REPEATS)
     steps: tuple[_SimpleStep, ...] = Field(min_length=1, max_length=MAX_STEPS)
 
 

@@ -27,6 +27,7 @@ import warnings
 from collections.abc import Iterator
 from typing import TextIO
 
+from app.log_text import LineFormatter
 from app.logs.records import QueueHandler
 from app.logs.streams import LineStream, Pipe
 from app.logs.writer import Writer
@@ -45,7 +46,7 @@ class _Apart:
     def __init__(self, pattern: str) -> None:
         # Private copies: the numbers 1 and 2 are about to mean something else.
         error, out = _copy(2), _copy(1)
-        self.error = Writer(error, "standard error", logging.Formatter(pattern))
+        self.error = Writer(error, "standard error", LineFormatter(pattern))
         together = os.path.sameopenfile(error, out)  # then their lines keep their order
         self.out = self.error if together else Writer(out, "standard output")
         self._streams = sys.stdout, sys.stderr

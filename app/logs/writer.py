@@ -8,6 +8,8 @@ import threading
 from traceback import TracebackException
 from typing import NamedTuple
 
+from app.log_text import indented
+
 WAITING = 1000
 """Pieces that wait to be written, at most; each of a line or a few."""
 LONGEST = 4096
@@ -106,7 +108,7 @@ class Writer:
         formatter = self._formatter or logging.Formatter()
         try:
             if trace is not None:
-                record.exc_text = "".join(trace.format()).rstrip("\n")
+                record.exc_text = indented("".join(trace.format()).rstrip("\n"))
             text = formatter.format(record)
         except Exception as error:  # the thread has to go on
             text = f"a line of {record.name} cannot be formatted: {type(error).__name__}"

@@ -17,6 +17,7 @@ import { OperatorLink } from "./core/operator-link.js";
 import { PictureReport } from "./core/picture-report.js";
 import { SourceKeeper } from "./core/source-keeper.js";
 import { ServerClock } from "./core/server-clock.js";
+import { ticket } from "./core/sign-in.js";
 import { SettingsKeeper } from "./core/settings.js";
 import { Stopper } from "./core/stopper.js";
 import { Store } from "./core/store.js";
@@ -99,7 +100,7 @@ const pressed = keys(root, {
     canMove: () => Boolean(store.state.robot && store.state.robot.armed),
     jog: { down: (event) => jog.down(event), up: (event) => jog.up(event) },
 });
-const views = stage(byId("stage"), store, { feeds, onFrame: pressed.listen, memory: settings });
+const views = stage(byId("stage"), store, { feeds, onFrame: pressed.listen, memory: settings, ticket });
 const reading = () => latency.reading(performance.now(), byId("stage").dataset.large);
 latencyBar(byId("stage"), reading);
 
@@ -363,6 +364,8 @@ const wishes = {
 
 root.addEventListener("farhand:want", ({ detail }) => wishes[detail.what](detail));
 byId("help-open").addEventListener("click", wishes.help);
+byId("account-open").setAttribute("aria-label", texts.account.open);
+byId("account-open").addEventListener("click", () => opening.account());
 byId("timeline-open").setAttribute("aria-label", texts.timeline.open);
 byId("timeline-open").addEventListener("click", () => opening.timeline());
 byId("teach-open").addEventListener("click", () => opening.teach());

@@ -2,6 +2,7 @@
 
 import { grabStill } from "./core/jpeg.js";
 import { preflight } from "./core/preflight.js";
+import { forget } from "./core/sign-in.js";
 import { texts } from "./texts/texts.js";
 import { preflightContent } from "./ui/preflight.js";
 import { askContent } from "./ui/sheets.js";
@@ -71,9 +72,35 @@ export class Opening {
             return;
         }
         const { Timeline } = await import("./ui/timeline/sheet.js");
-        this.#timeline ||= new Timeline(this.store, this.api);
+        this.#timeline ||= new Timeline(this.store, {
+            timeline: this.api.timeline,
+            eventUrl: this.api.eventUrl,
+            file: async (kinds) => {
+                const { download } = await import("./core/transfer.js");
+                return download(`api/timeline.jsonl?${new URLSearchParams(kinds.map((kind) => ["kind", kind]))}`);
+            },
+        });
         const { content, close } = await this.#timeline.open();
         this.sheets.show("timeline", texts.timeline.open, content, { onclose: close });
+    }
+
+    /** Who is signed in, and the way out; closes it where it is open. */
+    async account() {
+        if (this.sheets.name === "account") {
+            this.sheets.close();
+            return;
+        }
+        const { accountContent } = await import("./ui/account.js");
+        const session = await this.api.session().catch(() => null);
+        const content = accountContent(session, () => this.#signOut());
+        this.sheets.show("account", texts.account.title, content);
+    }
+
+    /** Leave. Where the server does not hear of it, the cookie that stays behind opens nothing by itself. */
+    async #signOut() {
+        await this.api.signOut().catch(() => {});
+        forget();
+        location.replace("signin");
     }
 
     /** Try out what the page needs, and say what is missing and how to mend it. */

@@ -20,6 +20,7 @@ from websockets.typing import Origin
 
 from app.gateway.machine import Names
 from app.gateway.tls import SERVER_FILE, LocalAuthority
+from tests.gateway.browser import SignedIn
 from tests.gateway.conftest import draw
 from tests.gateway.running import TOKEN, Operator, StandIn, running, settings_for, wait_for
 
@@ -111,20 +112,19 @@ def test_signing_in_driving_and_stopping_through_nginx(
                 sock=socket.create_connection(("127.0.0.1", port)),
                 ssl=trust,
                 origin=origin,
-                additional_headers={"Cookie": cookie},
+                **page.socket(),
                 max_size=None,
             )
 
         with link:
             signed_in = link.get("/", params={"token": TOKEN})
-            assert signed_in.status_code == 303, signed_in.text
-            assert (signed_in.status_code, signed_in.headers["location"]) == (303, f"{prefix}/")
-            cookie = signed_in.headers["set-cookie"].partition(";")[0]
-            assert cookie.startswith("__Host-")
+            page = SignedIn.by(signed_in)
+            assert signed_in.headers["location"].partition("#")[0] == f"{prefix}/"
+            assert page.cookie.startswith("__Host-")
             assert "; Secure" in signed_in.headers["set-cookie"]
-            headers = {"Cookie": cookie, "Origin": own}
-            page = link.get("/", headers=headers)
-            assert 'src="static/app.js"' in page.text
+            headers = {**page.headers(), "Origin": own}
+            shown = link.get("/", headers=headers)
+            assert 'src="static/app.js"' in shown.text
             assert link.get("/static/app.js", headers=headers).status_code == 200
 
             # More than nginx lets through by itself: the answer is ours.

@@ -20,9 +20,11 @@ from app.gateway.app import create_app
 from app.gateway.auth import Gatekeeper
 from app.gateway.guard import Guard
 from app.gateway.messages import CLIENT_MESSAGES, parse_client_message
+from app.gateway.page_secret import PAGE_PROTOCOL, PROTOCOL, page_secret, view_ticket
 from app.gateway.roles import (
     FRAME,
     MESSAGES,
+    PROOFS,
     ROUTES,
     WEBSOCKET,
     allows,
@@ -32,7 +34,8 @@ from app.gateway.roles import (
     may_send,
     routes_of,
 )
-from app.gateway.tokens import TokenStore, cookie_of
+from app.gateway.tokens import TokenStore, cookie_of, sha256
+from tests.gateway.browser import NAME
 from tests.gateway.conftest import draw
 from tests.gateway.running import BEARER, TOKEN, Running, StandIn, wait_for
 
@@ -108,7 +111,8 @@ def test_everything_that_changes_or_moves_something_is_the_operators() -> None:
         key for key, access in ROUTES.items() if not key.startswith("GET") and access != "operator"
     }
     assert open_to_observers == {
-        "POST /signin", "POST /api/robots/{id}/stop", "HEAD /static/{path:path}",
+        "POST /signin", "POST /api/sign-out", "POST /api/robots/{id}/stop",
+        "HEAD /static/{path:path}",
         "WEBSOCKET /ws/camera/{name}", "WEBSOCKET /ws/operator", "WEBSOCKET /viser",
         "WEBSOCKET /viser/",
     }  # fmt: skip
@@ -163,12 +167,15 @@ class Door:
         self.gatekeeper = Gatekeeper(self.tokens, secure=True, hosts=lambda: ("arm.example",))
         self.guard = Guard(self.behind, self.gatekeeper)
 
-    def ask(self, method: str, path: str, fields: dict[str, str]) -> tuple[int, bytes, bool]:
+    def ask(
+        self, method: str, path: str, fields: dict[str, str], query: str = ""
+    ) -> tuple[int, bytes, bool]:
         """Status, body, and whether the request got behind the door."""
         websocket = method == WEBSOCKET
         scope: dict[str, Any] = {
             "type": "websocket" if websocket else "http",
             "path": path,
+            "query_string": query.encode(),
             "headers": [(name.encode(), value.encode()) for name, value in fields.items()],
             "client": ("10.0.0.9", 5),
             "extensions": {"websocket.http.response": {}},
@@ -202,8 +209,12 @@ ORIGINS = {
 HOSTS = {"ours": "arm.example:8000", "foreign": "evil.example:8000", "none": None}
 
 
+HOW = ("bearer", "cookie", "cookie and ticket", "cookie and page")
+"""The last is a browser; what is on another port of its host gets no more than the second."""
+
+
 def cells() -> Iterator[tuple[str, str, str, str, str]]:
-    for key, who, how, origin, host in product(ROUTES, WHO, ("bearer", "cookie"), ORIGINS, HOSTS):
+    for key, who, how, origin, host in product(ROUTES, WHO, HOW, ORIGINS, HOSTS):
         if who != "nobody" or how == "cookie":
             yield key, who, how, origin, host
 
@@ -215,11 +226,43 @@ def expected(key: str, who: str, how: str, origin: str, host: str) -> int | None
         return 400
     if ROUTES[key] == "anyone":
         return None
+    if how != "bearer" and who != "nobody" and method not in ("GET", "HEAD") and origin != "ours":
+        return 403  # not looked at
     if who not in ("operator", "observer"):
         return 401
-    if how == "cookie" and method not in ("GET", "HEAD") and origin != "ours":
-        return 403
+    opened = {
+        "bearer": True,
+        "cookie": key in OPEN_BY_COOKIE,
+        "cookie and ticket": key in (*OPEN_BY_COOKIE, *OPEN_BY_TICKET),
+        "cookie and page": True,
+    }
+    if not opened[how]:
+        return 401
     return 403 if ROUTES[key] == "operator" and who == "observer" else None
+
+
+OPEN_BY_COOKIE = {
+    "GET /", "GET /static/{path:path}", "HEAD /static/{path:path}", "GET /docs",
+    "GET /openapi.json", "GET /viser", "GET /viser/{path:path}",
+}  # fmt: skip
+"""The page's own files."""
+OPEN_BY_TICKET = {
+    "GET /api/gestures/{id}/template.png", "GET /api/timeline/{id}/picture.jpg",
+    "GET /api/timeline/{id}/template.png", "WEBSOCKET /viser", "WEBSOCKET /viser/",
+}  # fmt: skip
+
+
+def show_page(fields: dict[str, str], method: str, proof: str) -> None:
+    if method == WEBSOCKET:
+        fields["sec-websocket-protocol"] = f"{PROTOCOL}, {PAGE_PROTOCOL}{proof}"
+    else:
+        fields["farhand-page"] = proof
+
+
+def test_what_opens_by_less_than_the_page_is_written_down_twice() -> None:
+    assert {key for key, proof in PROOFS.items() if proof == "cookie"} == OPEN_BY_COOKIE
+    assert {key for key, proof in PROOFS.items() if proof == "ticket"} == OPEN_BY_TICKET
+    assert PROOFS.keys() <= ROUTES.keys()
 
 
 def test_every_cell(tmp_path: Path) -> None:
@@ -236,7 +279,11 @@ def test_every_cell(tmp_path: Path) -> None:
             fields["authorization"] = f"Bearer {door.secrets[who]}"
         elif who != "nobody":
             fields["cookie"] = f"{door.gatekeeper.cookie_name}={cookie_of(door.secrets[who])}"
-        status, body, reached = door.ask(method, sample(path), fields)
+        digest = sha256(door.secrets.get(who, ""))
+        if how == "cookie and page":
+            show_page(fields, method, f"{page_secret(digest)}.{NAME}")
+        query = f"ticket={view_ticket(digest)}.{NAME}" if how == "cookie and ticket" else ""
+        status, body, reached = door.ask(method, sample(path), fields, query)
         wanted = expected(key, who, how, origin, host)
         cell = (key, who, how, origin, host, status, body)
         assert reached is (wanted is None), cell
@@ -247,7 +294,7 @@ def test_every_cell(tmp_path: Path) -> None:
             for secret in door.secrets.values():
                 assert len(secret) < 20 or secret.encode() not in body, cell
         count += 1
-    assert count == len(ROUTES) * 9 * len(ORIGINS) * len(HOSTS)
+    assert count == len(ROUTES) * 17 * len(ORIGINS) * len(HOSTS)
 
 
 @pytest.mark.parametrize(
@@ -290,7 +337,7 @@ def test_an_observer_sees_everything_and_moves_nothing(
         assert client.get("/").status_code == 200
         assert client.get("/metrics").status_code == 200
         assert client.get("/api/health").json()["robots"]
-        assert client.get("/api/timeline").json()["events"]
+        wait_for(lambda: client.get("/api/timeline").json()["events"], "an event to be written")
         for method, path in (
             ("DELETE", f"/api/gestures/{gesture}"),
             ("PATCH", f"/api/gestures/{gesture}"),

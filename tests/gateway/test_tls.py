@@ -101,6 +101,51 @@ def test_a_stolen_authority_cannot_play_somebody_else(machine: Machine, tmp_path
         assert "permitted subtree violation" in (handshake(server_context(file), pem, host) or "")
 
 
+@pytest.mark.parametrize(
+    "name", ["printer.local", "router.home.arpa", "db.internal", "local", "other", "a.example"]
+)
+def test_a_stolen_authority_cannot_play_another_machine(
+    machine: Machine, tmp_path: Path, name: str
+) -> None:
+    stolen = make_authority(HERE, machine.now)
+    file = tmp_path / "forged.pem"
+    file.write_bytes(make_leaf(stolen, Names((name,), ()), machine.now).pem())
+    pem = stolen.certificate.public_bytes(serialization.Encoding.PEM)
+    assert "permitted subtree violation" in (handshake(server_context(file), pem, name) or "")
+
+
+def test_a_router_may_give_the_machine_another_address_and_a_domain(machine: Machine) -> None:
+    machine.authority().prepare()
+    trusted = (machine.folder / AUTHORITY_FILE).read_bytes()
+    names = (*HERE.dns, "arm.home.arpa", "arm.internal")
+    machine.names = Names(names, (ipaddress.ip_address("10.9.8.7"),))
+    authority = machine.authority()
+    assert authority.prepare() is True
+    assert (machine.folder / AUTHORITY_FILE).read_bytes() == trusted
+    for host in machine.names.hosts():
+        context = server_context(authority.server_file)
+        assert handshake(context, authority.public.pem, host) is None, host
+
+
+def test_an_authority_of_an_earlier_version_is_kept_and_told(
+    machine: Machine, caplog: pytest.LogCaptureFixture
+) -> None:
+    wide = Names((*HERE.dns, "local", "internal"), HERE.addresses)
+    machine.names = wide
+    machine.authority().prepare()
+    trusted = (machine.folder / AUTHORITY_FILE).read_bytes()
+    machine.names = HERE
+    caplog.clear()
+    again = machine.authority()
+    with caplog.at_level(logging.WARNING):
+        again.prepare()
+        again.prepare()
+    assert (machine.folder / AUTHORITY_FILE).read_bytes() == trusted
+    told = [each for each in caplog.messages if "every name below local, internal" in each]
+    assert len(told) == 1
+    assert "delete the folder" in told[0]
+
+
 def test_keys_are_for_their_owner_alone(machine: Machine) -> None:
     machine.authority().prepare()
     assert stat.S_IMODE(machine.folder.stat().st_mode) == 0o700
@@ -150,7 +195,7 @@ def test_new_names_and_addresses_are_certified(machine: Machine) -> None:
     authority = machine.authority()
     authority.prepare()
     moved = Names(
-        ("arm", "localhost", "other.local"),
+        ("arm", "localhost", "arm.internal"),
         (ipaddress.ip_address("127.0.0.1"), ipaddress.ip_address("10.1.2.3")),
     )
     machine.names = moved
@@ -164,11 +209,11 @@ def test_a_running_server_takes_the_new_certificate(machine: Machine) -> None:
     authority = machine.authority()
     authority.prepare()
     context = server_context(authority.server_file)
-    machine.names = Names(("new.local",), ())
+    machine.names = Names(("new.arm.local",), ())
     assert authority.prepare()
-    assert handshake(context, authority.public.pem, "new.local") is not None
+    assert handshake(context, authority.public.pem, "new.arm.local") is not None
     context.load_cert_chain(authority.server_file)
-    assert handshake(context, authority.public.pem, "new.local") is None
+    assert handshake(context, authority.public.pem, "new.arm.local") is None
 
 
 def test_what_the_authority_may_not_certify_is_left_out_and_told_once(

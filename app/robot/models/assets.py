@@ -28,6 +28,7 @@ from app.robot.models.check import check
 from app.robot.models.model import AtKey, AttachmentModel, Model
 from app.robot.models.profile import Profile, load_profile
 from app.robot.models.urdf import Urdf, mesh_line, parse_urdf, read_urdf
+from app.scratch import ScratchFolder
 
 _log = logging.getLogger(__name__)
 
@@ -235,8 +236,9 @@ def _build(folder: Path, file: str, urdf: bytes, meshes: dict[str, Path]) -> Pat
         draft = Path(tempfile.mkdtemp(prefix=".new-", dir=folder.parent))
     except OSError as error:
         # A home folder that cannot be written (a container): keep it for this process only.
-        draft = Path(tempfile.mkdtemp(prefix="farhand-model-"))
-        atexit.register(shutil.rmtree, draft, ignore_errors=True)
+        scratch = ScratchFolder()
+        atexit.register(scratch.close)
+        draft = scratch.path
         _log.info("the model is kept in %s: %s", draft, error)
         folder = draft
     for name, path in meshes.items():

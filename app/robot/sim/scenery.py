@@ -1,7 +1,7 @@
 """What the pictures show of a robot: worlds for drawing only, and outlines for the shadows."""
 
+import contextlib
 import math
-import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -18,6 +18,7 @@ from app.robot.sim.kinematics import origin_of
 from app.robot.sim.lens import Matrix
 from app.robot.sim.shadow import outline
 from app.robot.sim.world import connect, load_robot, upright
+from app.scratch import ScratchFolder
 
 _SKIRT = 0.004
 """m; thickness of the boards that stand for the sides of a table whose top is drawn apart."""
@@ -216,8 +217,8 @@ def _load_visuals(
                 link.remove(visual)
     for mesh in tree.getroot().iter("mesh"):
         mesh.set("filename", str(drawn.parent / mesh.get("filename", "")))
-    with tempfile.TemporaryDirectory(prefix="farhand-") as folder:
-        path = Path(folder) / "visuals.urdf"
+    with contextlib.closing(ScratchFolder()) as folder:
+        path = folder.path / "visuals.urdf"
         tree.write(path)
         return load_robot(client, path)
 

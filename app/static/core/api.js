@@ -1,5 +1,7 @@
 // The REST interface, as docs/protocol.md has it.
 
+import { proofHeaders, ticket } from "./sign-in.js";
+
 /** What went wrong, with the server's own words where it gave some. */
 export class ApiError extends Error {
     constructor(status, code, message, detail = null) {
@@ -15,9 +17,10 @@ export class ApiError extends Error {
  * take that back by. Throws ApiError.
  */
 export async function request(method, path, { body, json, timeoutMs = 15000, keepalive = false } = {}) {
-    const init = { method, credentials: "same-origin", cache: "no-store", keepalive };
+    const headers = proofHeaders();
+    const init = { method, headers, credentials: "same-origin", cache: "no-store", keepalive };
     if (json !== undefined) {
-        init.headers = { "Content-Type": "application/json" };
+        headers["Content-Type"] = "application/json";
         init.body = JSON.stringify(json);
     } else if (body !== undefined) {
         init.body = body;
@@ -66,6 +69,10 @@ function inGallery(form, gallery) {
 }
 
 export const api = Object.freeze({
+    /** Who is signed in here: {role, token, name, expires}. */
+    session: () => request("GET", "api/session"),
+    /** Sign this browser out; what it has open ends. */
+    signOut: () => request("POST", "api/sign-out"),
     robots: () => request("GET", "api/robots"),
     robot: (robot) => request("GET", `api/robots/${id(robot)}`),
     stopRobot: (robot, timeoutMs) =>
@@ -89,7 +96,7 @@ export const api = Object.freeze({
         return request("GET", `api/timeline?${new URLSearchParams(wanted)}`);
     },
     /** Address of an event's "picture.jpg" or "template.png". */
-    eventUrl: (event, what) => `api/timeline/${id(event)}/${what}`,
+    eventUrl: (event, what) => `api/timeline/${id(event)}/${what}?ticket=${ticket()}`,
     gestures: (gallery) =>
         request("GET", isNamed(gallery) ? `api/gestures?gallery=${id(gallery)}` : "api/gestures"),
     createGesture(name, action, images, gallery) {
@@ -130,6 +137,6 @@ export const api = Object.freeze({
     },
     /** Address of a template's picture; `version` makes it new after a change. */
     templateUrl(gesture, version, sample = 0) {
-        return `api/gestures/${id(gesture)}/template.png?sample=${sample}&v=${id(version)}`;
+        return `api/gestures/${id(gesture)}/template.png?sample=${sample}&v=${id(version)}&ticket=${ticket()}`;
     },
 });

@@ -1,5 +1,6 @@
 // What the page needs of the browser and of the way to the server, tried out.
 
+import { proofProtocols } from "./sign-in.js";
 import { socketUrl } from "./socket.js";
 import { SourceError, WebcamSource } from "./webcam.js";
 
@@ -21,7 +22,7 @@ async function camera() {
 /** Whether a WebSocket opens. Some proxies and filters let pages through, and these not. */
 function webSocket(path) {
     return new Promise((resolve) => {
-        const socket = new WebSocket(socketUrl(path));
+        const socket = new WebSocket(socketUrl(path), proofProtocols());
         const end = (code) => {
             clearTimeout(timer);
             socket.onopen = socket.onclose = null;

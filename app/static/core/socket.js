@@ -1,5 +1,7 @@
 // A WebSocket that comes back.
 
+import { proofProtocols } from "./sign-in.js";
+
 const FIRST_DELAY_MS = 250;
 const LONGER = 1.5; // each delay than the one before, and a fifth of it either way by chance
 const LONGEST_DELAY_MS = 5000;
@@ -85,7 +87,7 @@ export class ReconnectingSocket extends EventTarget {
     #connect() {
         this.#drop();
         this.#tell("connecting");
-        const socket = new WebSocket(this.#url);
+        const socket = new WebSocket(this.#url, proofProtocols());
         socket.binaryType = "arraybuffer";
         this.#socket = socket;
         this.#heardAt = performance.now();

@@ -1,6 +1,7 @@
 // Files to and from the server, with how far they are and a way to stop them.
 
 import { ApiError } from "./api.js";
+import { proofHeaders } from "./sign-in.js";
 
 const cancelled = () => new ApiError(409, "cancelled", "");
 
@@ -20,7 +21,8 @@ export function upload(path, file, type, { onProgress = () => {}, signal }) {
         // Not fetch(): it does not tell how much has gone.
         const request = new XMLHttpRequest();
         request.open("POST", new URL(path, document.baseURI));
-        request.setRequestHeader("Content-Type", type);
+        const headers = { ...proofHeaders(), "Content-Type": type };
+        for (const [name, value] of Object.entries(headers)) request.setRequestHeader(name, value);
         request.upload.onprogress = ({ loaded, total }) => onProgress(total ? loaded / total : 0);
         request.onload = () => {
             if (request.status >= 200 && request.status < 300) resolve(JSON.parse(request.responseText));
@@ -37,9 +39,13 @@ export function upload(path, file, type, { onProgress = () => {}, signal }) {
 }
 
 /** Fetch a file; gives {blob, name}. `onProgress(bytes)` as they come. Throws ApiError. */
-export async function download(path, { onProgress = () => {}, signal }) {
+export async function download(path, { onProgress = () => {}, signal } = {}) {
     try {
-        const answer = await fetch(new URL(path, document.baseURI), { signal, cache: "no-store" });
+        const answer = await fetch(new URL(path, document.baseURI), {
+            headers: proofHeaders(),
+            signal,
+            cache: "no-store",
+        });
         if (!answer.ok) throw errorOf(answer.status, await answer.text());
         const reader = answer.body.getReader();
         const parts = [];

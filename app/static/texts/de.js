@@ -72,8 +72,8 @@ export const texts = Object.freeze({
         awayWords: (why) => `Er sagt: ${why}. Diese Seite versucht es von selbst weiter.`,
         signedOutTitle: "Sie sind abgemeldet",
         signedOutWords:
-            "Öffnen Sie den Link, den der Server beim Start ausgegeben hat. Er meldet diesen Browser an.",
-        reload: "Seite neu laden",
+            "Öffnen Sie den Link, den der Server beim Start ausgegeben hat, oder melden Sie sich mit seinem Token an.",
+        signIn: "Anmelden",
     },
 
     steps: { source: "Eingabe", control: "Steuerung", armed: "Freigabe" },
@@ -582,6 +582,23 @@ export const texts = Object.freeze({
             showWhy: "Senken Sie die Hand, dann steht er still.",
             finish: "Losfahren",
         },
+    },
+
+    account: {
+        open: "Wer angemeldet ist; abmelden",
+        title: "Angemeldet",
+        roles: {
+            operator: "Als Bediener: Dieser Browser darf steuern, Gesten lehren und anhalten.",
+            observer: "Als Zuschauer: Dieser Browser darf zusehen und anhalten.",
+        },
+        token: (name) => `Token: ${name}`,
+        until: (time) => `Gültig bis ${time}`,
+        forever: "Gültig, bis es zurückgenommen wird",
+        unknown: "Der Server sagt nicht, wer angemeldet ist.",
+        what:
+            "Abmelden beendet alles, was dieser Browser hier offen hat; wenn Sie steuern, hält der Roboter an. " +
+            "Das Token selbst bleibt gültig.",
+        signOut: "Abmelden",
     },
 
     timeline: {

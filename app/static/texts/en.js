@@ -72,8 +72,8 @@ export const texts = Object.freeze({
         awayWords: (why) => `It says: ${why}. This page goes on trying by itself.`,
         signedOutTitle: "You are signed out",
         signedOutWords:
-            "Open the link that the server printed when it started. It signs this browser in.",
-        reload: "Load the page again",
+            "Open the link that the server printed when it started, or sign in with its token.",
+        signIn: "Sign in",
     },
 
     steps: { source: "Input", control: "Control", armed: "Armed" },
@@ -579,6 +579,23 @@ export const texts = Object.freeze({
             showWhy: "Lower your hand, and it stands still.",
             finish: "Drive",
         },
+    },
+
+    account: {
+        open: "Who is signed in; sign out",
+        title: "Signed in",
+        roles: {
+            operator: "As an operator: this browser may drive, teach and stop.",
+            observer: "As an observer: this browser may watch, and stop.",
+        },
+        token: (name) => `Token: ${name}`,
+        until: (time) => `Good until ${time}`,
+        forever: "Good until it is revoked",
+        unknown: "The server does not say who is signed in.",
+        what:
+            "Signing out ends everything that this browser has open here; if you drive, the robot stops. " +
+            "The token itself stays good.",
+        signOut: "Sign out",
     },
 
     timeline: {

@@ -129,3 +129,10 @@ export async function bitmapFromBase64(text, type = "image/png") {
         return null;
     }
 }
+
+/** Hand a file to the browser, which saves it where it saves files. */
+export function saveFile({ blob, name }) {
+    const address = URL.createObjectURL(blob);
+    el("a", { href: address, download: name }).click();
+    setTimeout(() => URL.revokeObjectURL(address), 60000);
+}

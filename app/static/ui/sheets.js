@@ -124,10 +124,10 @@ export function goneContent(kind, why, retry) {
         { class: "gone-card" },
         el("p", { class: "gone-title", text: title }),
         el("p", { text: words }),
-        button(signedOut ? gone.reload : gone.retry, {
+        button(signedOut ? gone.signIn : gone.retry, {
             class: "primary",
             id: "gone-retry",
-            onclick: () => (signedOut ? location.reload() : retry()),
+            onclick: () => (signedOut ? location.assign("signin") : retry()),
         }),
     );
 }

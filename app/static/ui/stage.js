@@ -32,17 +32,18 @@ function newViewId() {
     return Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
-/** Address of the 3D view's own connection, which says whose view it is. */
-function viewSocket(id) {
-    const url = new URL(`viser?view=${id}`, document.baseURI);
+/** Address of the 3D view's own connection, which says whose view it is and that it may be seen. */
+function viewSocket(id, ticket) {
+    const url = new URL(`viser?view=${id}&ticket=${ticket}`, document.baseURI);
     url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
     return encodeURIComponent(url.href);
 }
 
 /** The 3D view in its frame: loaded when first seen, and again when the server came back. */
 class View3d {
-    constructor(enlarge, onFrame, { drawing, hidden, onHide }) {
+    constructor(enlarge, onFrame, { drawing, hidden, onHide, ticket }) {
         this.onFrame = onFrame;
+        this.ticket = ticket;
         this.id = newViewId();
         this.visible = false;
         this.drawing = drawing;
@@ -106,7 +107,7 @@ class View3d {
         this.frame = el("iframe", {
             title: texts.stage.views["3d"],
             // One point a pixel: software WebGL has no speed to spare.
-            src: `viser/?fixedDpr=1&websocket=${viewSocket(this.id)}`,
+            src: `viser/?fixedDpr=1&websocket=${viewSocket(this.id, this.ticket())}`,
             onload: () => this.#loaded(),
         });
         this.element.prepend(this.frame);
@@ -146,11 +147,12 @@ class View3d {
 
 /**
  * Fills `element`. `feeds` maps camera names to feeds; `onFrame(window)` is called with the 3D
- * frame's window, so that keys work in there; `memory` keeps small choices. Returns `swap`, which
+ * frame's window, so that keys work in there; `memory` keeps small choices; `ticket()` is what lets the
+ * 3D view in. Returns `swap`, which
  * makes the other camera large, `recall`, which makes large what `memory` says, and `view3d`, which can be
  * borrowed: it is then open and large until it is given back, and nothing of that is remembered.
  */
-export function stage(element, store, { feeds, onFrame, memory }) {
+export function stage(element, store, { feeds, onFrame, memory, ticket }) {
     const enlarge = (name) => {
         element.dataset.large = name;
         memory.set("large", name);
@@ -164,7 +166,7 @@ export function stage(element, store, { feeds, onFrame, memory }) {
         memory.set("hide-3d", now ? "yes" : "no");
         if (now && element.dataset.large === "3d") enlarge("wrist");
     };
-    const view3d = new View3d(enlarge, onFrame, { drawing, hidden, onHide });
+    const view3d = new View3d(enlarge, onFrame, { drawing, hidden, onHide, ticket });
     const views = [...cameras, view3d];
     element.append(...views.map((view) => view.element));
     const recall = () => {

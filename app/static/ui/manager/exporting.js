@@ -1,7 +1,7 @@
 // The gallery as one file.
 
 import { texts } from "../../texts/texts.js";
-import { el } from "../dom.js";
+import { el, saveFile } from "../dom.js";
 import { withProgress } from "./progress.js";
 
 const words = texts.manager.export;
@@ -14,9 +14,7 @@ export function exporting(panel, signal, { act }) {
             onProgress: (bytes) => onProgress(null, null, words.running(Math.ceil(bytes / 1024))),
         });
     return withProgress(panel, signal, words.running(0), work, ({ blob, name }) => {
-        const address = URL.createObjectURL(blob);
-        el("a", { href: address, download: name }).click();
-        setTimeout(() => URL.revokeObjectURL(address), 60000);
+        saveFile({ blob, name });
         return [el("p", { class: "quiet", role: "status", text: words.done(name) })];
     });
 }

@@ -1,7 +1,7 @@
 // What happened, newest first: by day, with pictures, growing while it is looked at.
 
 import { language, texts } from "../../texts/texts.js";
-import { button, el, icon, setText } from "../dom.js";
+import { button, el, icon, saveFile, setText } from "../dom.js";
 import { describeError } from "../words.js";
 import { describeEvent, GROUPS } from "./describe.js";
 
@@ -11,7 +11,7 @@ const FRESH_EVERY_MS = 1000;
 const day = new Intl.DateTimeFormat(language, { weekday: "long", day: "numeric", month: "long", year: "numeric" });
 const clock = new Intl.DateTimeFormat(language, { hour: "2-digit", minute: "2-digit", second: "2-digit", hourCycle: "h23" });
 
-/** Made once; `open` gives what to show on a sheet. `api` {timeline(), eventUrl()} */
+/** Made once; `open` gives what to show on a sheet. `api` {timeline(), eventUrl(), file()} */
 export class Timeline {
     #store;
     #api;
@@ -19,7 +19,7 @@ export class Timeline {
     #note = el("p", { class: "quiet", role: "status" });
     #filter;
     #older = button(words.older, { id: "timeline-older", onclick: () => this.#load(this.#before) });
-    #save = el("a", { class: "timeline-save", id: "timeline-save", download: "", text: words.save });
+    #save = button(words.save, { class: "timeline-save quiet-button", id: "timeline-save", onclick: () => this.#keep() });
     #events = new Map(); // by id
     #rows = new Map(); // by id: {key, item}
     #before = null; // asks for the next page
@@ -69,11 +69,19 @@ export class Timeline {
         this.#events.clear();
         this.#rows.clear();
         this.#list.replaceChildren();
-        const query = new URLSearchParams(this.#kinds.map((kind) => ["kind", kind]));
-        this.#save.href = `api/timeline.jsonl?${query}`;
         setText(this.#note, words.loading);
         this.#older.hidden = true;
         this.#load(null);
+    }
+
+    /** Everything as a file. */
+    async #keep() {
+        try {
+            saveFile(await this.#api.file(this.#kinds));
+        } catch (error) {
+            if (typeof error.status !== "number") throw error; // a mistake of the page
+            setText(this.#note, error.status ? describeError(error) : words.failed);
+        }
     }
 
     async #fresh() {
