@@ -10,9 +10,7 @@ the listener was not used, no server is made.
 """
 
 import gzip
-import shutil
 import socket
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -26,6 +24,7 @@ from viser.infra import _infra
 from websockets.asyncio.server import ServerConnection, unix_serve
 
 from app.errors import CannotStart, NotAllowed
+from app.scratch import ScratchFolder
 
 KNOWN_VERSION = "1.1."
 """What the version of viser begins with whose insides are known here."""
@@ -117,15 +116,14 @@ class PrivateServer(viser.ViserServer):
                 f"the 3D view needs viser {KNOWN_VERSION}x; {viser.__version__} is installed"
             )
         try:
-            # mkdtemp: mode 0700, so that nobody else reaches the socket in it.
-            self._folder = Path(tempfile.mkdtemp(prefix="farhand-"))
+            self._folder = ScratchFolder()
         except OSError as error:
             raise CannotStart(f"no private folder for the 3D view: {error}") from error
-        self.path = self._folder / "viser"
+        self.path = self._folder.path / "viser"
         try:
             listener = _Listener(self.path)
         except OSError as error:
-            shutil.rmtree(self._folder, ignore_errors=True)
+            self._folder.close()
             raise CannotStart(f"no socket for the 3D view at {self.path}: {error}") from error
         super().__init__(host=cast(str, listener), port=0, verbose=False)
         if not listener.is_used:
@@ -157,7 +155,7 @@ class PrivateServer(viser.ViserServer):
     def stop(self) -> None:
         """End the server's threads, and take its socket away."""
         super().stop()
-        shutil.rmtree(self._folder, ignore_errors=True)
+        self._folder.close()
 
 
 class Page:
