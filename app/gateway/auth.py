@@ -268,6 +268,15 @@ class Connections:
         self._tokens = tokens
         self._open: dict[Callable[[], None], str] = {}
 
+    def check(self, identity: Identity | None) -> None:
+        """Do nothing if this token still opens something.
+
+        Raises:
+            NotSignedIn: it was revoked, or ran out.
+        """
+        if identity is not None and not self._tokens.is_alive(identity.token):
+            raise NotSignedIn("the token was revoked or ran out; nothing was changed")
+
     @contextmanager
     def kept(self, identity: Identity, end: Callable[[], None]) -> Iterator[None]:
         """Meanwhile ``end`` is called when the token has run out or was revoked."""

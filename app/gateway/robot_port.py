@@ -175,12 +175,13 @@ class RobotPort:
     def wait_newer(self, timeout_s: float, so: Callable[[State], bool] = lambda _: True) -> bool:
         """Wait for a state that comes after this call and is so; False when none does."""
         since = time.monotonic()
-
-        def has_come() -> bool:
-            return self._state is not None and (self._state_at or 0.0) > since and so(self._state)
-
         with self._changed:
-            return self._changed.wait_for(has_come, timeout_s)
+            return self._changed.wait_for(lambda: self.has_newer(since, so), timeout_s)
+
+    def has_newer(self, since: float, so: Callable[[State], bool] = lambda _: True) -> bool:
+        """Whether a state came after ``since`` (s, monotonic) and is so."""
+        state, at = self._state, self._state_at
+        return state is not None and (at or 0.0) > since and so(state)
 
     # Asking
 
@@ -190,6 +191,13 @@ class RobotPort:
         if link is not None:
             with contextlib.suppress(RobotUnavailable):
                 link.send(command)
+
+    def send_stop(self, request: StopRequest) -> None:
+        """Tell the robot to stop, and do not wait; :meth:`stop` makes sure that it did."""
+        link = self._link
+        if link is not None:
+            with contextlib.suppress(RobotUnavailable):
+                link.stop(request)
 
     def stop(self, request: StopRequest, timeout_s: float) -> None:
         """Stop the robot, and wait until it says that it has understood.
@@ -209,10 +217,7 @@ class RobotPort:
             return counted or state.mode == "stopped"
 
         while True:
-            link = self._link
-            if link is not None:
-                with contextlib.suppress(RobotUnavailable):
-                    link.stop(request)
+            self.send_stop(request)
             if not told:  # after it was sent, because a log may make us wait
                 told = True
                 log.warning("stop: %s (%s)", request.reason, request.source)
