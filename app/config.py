@@ -517,6 +517,12 @@ class GatewaySettings(_Section):
         description="processes for pictures that were uploaded; jobs have two more, and learning a "
         "gallery one",
     )
+    work_niceness: int = Field(
+        default=19,
+        ge=0,
+        le=19,
+        description="how far those processes stand back behind everything else on the machine",
+    )
     work_mib: int = Field(
         default=1024,
         ge=256,
@@ -527,8 +533,7 @@ class GatewaySettings(_Section):
         default=16,
         ge=1,
         le=1000,
-        description="uploads over REST that are read or worked on at once; one more gets a "
-        "429",
+        description="uploads over REST that are read or worked on at once; one more gets a 429",
     )
     body_s: float = Field(
         default=120.0,

@@ -104,9 +104,12 @@ class Hub:
         self.learners = BoundedThreads("gallery", LEARN_THREADS, LEARN_WAITING)
         """For those who wait until a gallery is learned."""
         memory = limits.work_mib << 20
-        self.pictures = WorkPool(limits.workers, 2 * limits.max_uploads, memory)
-        self.long_work = WorkPool(MOST_RUNNING, MOST_RUNNING, LEARN_MEMORY * memory)
-        self._learning = WorkPool(1, LEARN_WAITING, LEARN_MEMORY * memory, LEARN_NICENESS)
+        nice = limits.work_niceness
+        self.pictures = WorkPool(limits.workers, 2 * limits.max_uploads, memory, nice)
+        self.long_work = WorkPool(MOST_RUNNING, MOST_RUNNING, LEARN_MEMORY * memory, nice)
+        self._learning = WorkPool(
+            1, LEARN_WAITING, LEARN_MEMORY * memory, min(nice, LEARN_NICENESS)
+        )
         gallery.learn = functools.partial(self._learning.call, fit)
         self._dry_run_thread = ThreadPoolExecutor(1, "dry-run")
         self._refresh_thread = ThreadPoolExecutor(1, "refresh")

@@ -44,7 +44,6 @@ CHECK_S = 0.02
 GRACE_S = 2.0
 """A picture that nobody waits for any more may still be finished for so long: a new process takes
 as long to start."""
-NICENESS = 19
 IDLE_S = 60.0
 """A process without work for so long gives its memory back."""
 
@@ -82,7 +81,7 @@ class WorkPool:
         niceness: Of the processes, 0 to 19.
     """
 
-    def __init__(self, processes: int, waiting: int, memory: int, niceness: int = NICENESS) -> None:
+    def __init__(self, processes: int, waiting: int, memory: int, niceness: int) -> None:
         self._most = processes
         self._waiting = waiting
         self._memory = memory

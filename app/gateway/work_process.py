@@ -19,9 +19,6 @@ from app.errors import FarhandError
 from app.gateway.work_messages import Piece, Told
 from app.robot.beside import give_way
 
-PROGRESS_S = 0.05
-"""Progress is told no more often than this."""
-
 
 def run(connection: Connection) -> None:
     """Do what is asked for, until the other end is closed."""
@@ -40,13 +37,13 @@ def run(connection: Connection) -> None:
 
 
 def _do(piece: Piece, connection: Connection) -> Told:
-    last = 0.0
+    last = -1
 
     def progress(done: int, total: int) -> None:
         nonlocal last
-        now = time.monotonic()
-        if done == total or now - last >= PROGRESS_S:
-            last = now
+        percent = 100 * done // max(total, 1)
+        if percent != last:  # telling takes longer than many a step
+            last = percent
             connection.send(Told("progress", (done, total)))
 
     keywords = {"progress": progress} if piece.tells else {}
