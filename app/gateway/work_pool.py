@@ -264,8 +264,11 @@ class _Process:
             code = self._process.wait(5.0)
             if code == -signal.SIGXCPU:
                 raise _too_long(task) from None
-            if code in (-signal.SIGKILL, -signal.SIGSEGV, -signal.SIGABRT):
-                raise _too_much_memory(task) from None
+            if code in (-signal.SIGKILL, -signal.SIGSEGV, -signal.SIGABRT, -signal.SIGBUS):
+                raise TooMuchWork(
+                    "a process ended while it worked on this, as it does when memory runs out; "
+                    "nothing was changed"
+                ) from None
             raise RuntimeError(f"a process for work ended by itself ({code})") from None
 
 
