@@ -73,12 +73,12 @@ class Slots:
 
     Args:
         most: So many.
-        what: They are, for the error message.
+        full: What is said when all are taken.
     """
 
-    def __init__(self, most: int, what: str) -> None:
+    def __init__(self, most: int, full: str) -> None:
         self._most = most
-        self._what = what
+        self._full = full
         self._taken = 0
 
     def check(self) -> None:
@@ -88,7 +88,7 @@ class Slots:
             Busy: all are taken.
         """
         if self._taken >= self._most:
-            raise Busy(f"{self._most} {self._what} are under way, which is the most; try again")
+            raise Busy(self._full)
 
     @contextmanager
     def one(self) -> Iterator[None]:

@@ -96,9 +96,14 @@ class Hub:
         self.checking = asyncio.Lock()
         """Held while a program is being checked."""
         self.jobs = Jobs()
-        self.uploads = Slots(limits.max_uploads, "uploads")
+        self.uploads = Slots(
+            limits.max_uploads,
+            f"{limits.max_uploads} uploads are under way, which is the most; try again",
+        )
         """Held while an upload is read or worked on."""
-        self.exports = Slots(MOST_EXPORTS, "exports")
+        self.exports = Slots(
+            MOST_EXPORTS, f"{MOST_EXPORTS} exports are under way, which is the most; try again"
+        )
         self.database = BoundedThreads("database", DATABASE_THREADS, DATABASE_WAITING)
         """For what requests read and write. Nothing that stops or drives waits for these."""
         self.learners = BoundedThreads("gallery", LEARN_THREADS, LEARN_WAITING)

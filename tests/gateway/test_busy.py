@@ -48,9 +48,9 @@ async def test_a_call_that_is_given_up_before_it_began_frees_its_place() -> None
 
 
 def test_places_are_given_back_whatever_happens() -> None:
-    slots = Slots(1, "uploads")
+    slots = Slots(1, "1 upload is under way")
     with pytest.raises(ZeroDivisionError), slots.one():
-        with pytest.raises(Busy, match="1 uploads are under way"):
+        with pytest.raises(Busy, match="1 upload is under way"):
             slots.check()
         raise ZeroDivisionError
     slots.check()
