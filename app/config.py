@@ -516,7 +516,38 @@ class GatewaySettings(_Section):
         description="who drives by a picture of the robot older than this, and says so, cannot see "
         "it: the arm holds still; 0 never",
     )
-    workers: int = Field(default=4, ge=1, le=64, description="threads for image work")
+    workers: int = Field(
+        default=2,
+        ge=1,
+        le=64,
+        description="processes for pictures that were uploaded; jobs have two more, and learning a "
+        "gallery one",
+    )
+    work_niceness: int = Field(
+        default=19,
+        ge=0,
+        le=19,
+        description="how far those processes stand back behind everything else on the machine",
+    )
+    work_mib: int = Field(
+        default=1024,
+        ge=256,
+        le=65536,
+        description="MiB of memory that a picture may take to work on; a gallery four times that",
+    )
+    max_uploads: int = Field(
+        default=16,
+        ge=1,
+        le=1000,
+        description="uploads over REST that are read or worked on at once; one more gets a 429",
+    )
+    body_s: float = Field(
+        default=120.0,
+        ge=1.0,
+        le=3600.0,
+        description="time that a request's whole body may take to arrive; who is not signed in "
+        "has 10 s",
+    )
     robot_rate_hz: float = Field(
         default=20.0, ge=10.0, le=60.0, description="robot messages a second to every session"
     )

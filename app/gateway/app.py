@@ -117,7 +117,12 @@ def create_app(
     app.state.authority = authority
     app.state.settings = settings
     install_error_handlers(app)
-    app.add_middleware(Guard, gatekeeper=gatekeeper, prefix=settings.root_path)
+    app.add_middleware(
+        Guard,
+        gatekeeper=gatekeeper,
+        prefix=settings.root_path,
+        body_s=settings.gateway.body_s,
+    )
     for router in (
         pages,
         signing.router,

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from app.errors import NotSignedIn
 from app.gateway.tokens import TokenStore
 
 if TYPE_CHECKING:
@@ -22,6 +23,15 @@ class Connections:
     def __init__(self, tokens: TokenStore) -> None:
         self._tokens = tokens
         self._open: dict[Callable[[], None], Identity] = {}
+
+    def check(self, identity: "Identity | None") -> None:
+        """Do nothing if this token still opens something.
+
+        Raises:
+            NotSignedIn: it was revoked, or ran out.
+        """
+        if identity is not None and not self._tokens.is_alive(identity.token):
+            raise NotSignedIn("the token was revoked or ran out; nothing was changed")
 
     @contextmanager
     def kept(self, identity: "Identity", end: Callable[[], None]) -> Iterator[None]:

@@ -1,14 +1,12 @@
 """Enrolment: images to templates, with what is wrong with them and what they may be confused with.
 
-Every image is a job of its own for the worker threads, so that the live frames of an operator get
-their turn between the frames of a burst.
+Every image is a piece of its own for the processes (:mod:`app.gateway.work_pool`), so that uploads
+take turns, and one whose client is gone ends after the image that is under way.
 """
 
-import asyncio
-import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,11 +17,14 @@ from app.pipeline import pack_template, unpack_template
 from app.pipeline.burst import Look, choose, look_at, see
 from app.pipeline.confusion import Comparison, Confusion, compare
 from app.pipeline.quality import Finding
+from app.pipeline.types import U8
 
 if TYPE_CHECKING:
     from app.gateway.hub import Hub
 
-T = TypeVar("T")
+
+Set = tuple[str, U8]
+"""Name and (n, 80, 60) templates of a gesture."""
 
 
 @dataclass(frozen=True)
@@ -68,12 +69,6 @@ class Judged:
         }
 
 
-async def run(hub: "Hub", work: Callable[..., T], *arguments: Any) -> T:
-    """Do image work in a worker thread."""
-    loop = asyncio.get_running_loop()
-    return await loop.run_in_executor(hub.images, functools.partial(work, *arguments))
-
-
 async def judge(hub: "Hub", images: Sequence[bytes], *, burst: bool) -> Judged:
     """Judge the images of an upload, none of which stops the others.
 
@@ -83,9 +78,9 @@ async def judge(hub: "Hub", images: Sequence[bytes], *, burst: bool) -> Judged:
     if not images:
         raise Invalid("at least one image is needed in 'images'", field="images")
     settings = hub.settings.pipeline
-    looks = [await run(hub, look_at, image, settings) for image in images]
+    looks = [await hub.pictures.run(look_at, image, settings) for image in images]
     if burst:
-        chosen = await run(hub, choose, looks, settings)
+        chosen = await hub.pictures.run(choose, looks, settings)
         return Judged(chosen.looks, chosen.kept, chosen.left_out)
     return _all_good(looks)
 
@@ -104,7 +99,7 @@ async def judge_for_enrolment(hub: "Hub", images: Sequence[bytes], *, burst: boo
         looks = []
         for number, image in enumerate(images, start=1):
             try:
-                looks.append(await run(hub, see, image, hub.settings.pipeline))
+                looks.append(await hub.pictures.run(see, image, hub.settings.pipeline))
             except ImageRefused as error:
                 error.detail["image"] = number
                 if len(images) > 1:
@@ -161,16 +156,24 @@ def confusions_json(
     others = [gesture for gesture in gestures if gesture.id != besides]
     if not templates or not others:
         return []
-    sets = [_stacked(name, templates)] + [_of(gesture) for gesture in others]
-    found = compare(sets, settings.match, threshold, asked=[0])
+    found = compare(sets_of(name, templates, others), settings.match, threshold, asked=[0])
+    return found_json(found, others, threshold)
+
+
+def sets_of(name: str, templates: Sequence[bytes], others: Sequence[Gesture]) -> list[Set]:
+    """What :func:`~app.pipeline.confusion.compare` takes: a gesture, then the others."""
+    return [_stacked(name, templates)] + [set_of(gesture) for gesture in others]
+
+
+def found_json(
+    found: Comparison, others: Sequence[Gesture], threshold: float
+) -> list[dict[str, Any]]:
+    """What the first of :func:`sets_of` may be confused with."""
     return [_confusion_json(one, others[one.other - 1], threshold) for one in found.confusions]
 
 
-def matrix_json(
-    gestures: Sequence[Gesture], settings: PipelineSettings, threshold: float
-) -> dict[str, Any]:
-    """All gestures against all others, as the page draws it; takes a while."""
-    found: Comparison = compare([_of(gesture) for gesture in gestures], settings.match, threshold)
+def matrix_json(found: Comparison, gestures: Sequence[Gesture], threshold: float) -> dict[str, Any]:
+    """All gestures against all others, as the page draws it."""
     return {
         "threshold": threshold,
         "gestures": [
@@ -194,11 +197,12 @@ def matrix_json(
     }
 
 
-def _of(gesture: Gesture) -> tuple[str, Any]:
+def set_of(gesture: Gesture) -> Set:
+    """A gesture as :func:`~app.pipeline.confusion.compare` takes it."""
     return _stacked(gesture.name, [sample.template for sample in gesture.samples])
 
 
-def _stacked(name: str, templates: Sequence[bytes]) -> tuple[str, Any]:
+def _stacked(name: str, templates: Sequence[bytes]) -> Set:
     return name, np.stack([unpack_template(template) for template in templates])
 
 

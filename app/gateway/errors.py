@@ -44,10 +44,15 @@ def error_body(code: str, message: str, detail: Mapping[str, Any] | None = None)
 
 def error_response(error: FarhandError, headers: Mapping[str, str] | None = None) -> JSONResponse:
     """The answer that ``error`` becomes."""
+    more = dict(headers or {})
+    if "retry_after_s" in error.detail:
+        more.setdefault("Retry-After", str(error.detail["retry_after_s"]))
+    if error.status == 408:  # the rest of the body would still be waited for
+        more.setdefault("Connection", "close")
     return JSONResponse(
         error_body(error.code, error.message, error.detail),
         status_code=error.status,
-        headers=dict(headers) if headers else None,
+        headers=more or None,
     )
 
 

@@ -1,6 +1,7 @@
 """The work on one frame, done in a thread: recognise, decide, command, describe."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +14,7 @@ from app.gateway.eyes import FrozenCamera
 from app.gateway.gallery import Enrolled
 from app.gateway.numbers import Counter, tick_ms
 from app.gateway.robot_port import RobotPort
+from app.link.messages import StopRequest
 from app.pipeline import Pipeline
 
 
@@ -45,7 +47,17 @@ class FrameDone:
 
 
 class FrameWorker:
-    """One session's pipeline and driver. One frame at a time, on whichever thread."""
+    """One session's pipeline and driver. One frame at a time, on whichever thread.
+
+    Args:
+        session: Name of the session.
+        settings: Of the whole server.
+        enrolled: The gallery to begin with.
+        robot: Gets the commands.
+        holds: Numbers of showings; shared by all sessions.
+        sequence: Numbers of commands; shared by all that commands for this session.
+        stop: Stops the robot; called on the thread, as soon as it is known that a frame says stop.
+    """
 
     def __init__(
         self,
@@ -55,9 +67,11 @@ class FrameWorker:
         robot: RobotPort,
         holds: Counter,
         sequence: Counter,
+        stop: Callable[[StopRequest], None],
     ) -> None:
         self._settings = settings
         self._robot = robot
+        self._stop = stop
         self._pipeline = Pipeline(settings.pipeline, enrolled.matcher)
         self._enrolled = enrolled
         self._driver = Driver(session, holds, sequence)
@@ -80,6 +94,8 @@ class FrameWorker:
         decision = self._driver.decide(
             result.gesture, job.seq, job.situation, cause=result.cause, frozen=frozen
         )
+        if decision.stop is not None:
+            self._stop(decision.stop)  # before anything else is sent, drawn or encoded
         if decision.command is not None:
             self._robot.send(decision.command)
         ended = time.monotonic()

@@ -2,13 +2,12 @@
 
 import asyncio
 import time
-from collections.abc import Callable
 from concurrent.futures import Executor
 
 from app.errors import FrameRefused
 from app.gateway.bad_messages import BadMessages
 from app.gateway.diary.session import SessionDiary
-from app.gateway.frame_job import FrameDone, FrameWorker
+from app.gateway.frame_job import FrameWorker
 from app.gateway.frame_slot import FrameSlot
 from app.gateway.metrics import Metrics
 from app.gateway.outbox import Outbox
@@ -22,11 +21,10 @@ class FrameWork:
     Args:
         slot: Where the frames come from.
         worker: What looks at them.
-        images: The threads for that.
+        thread: For that, and for nothing else.
         outbox: Where its messages go.
         counted: Where good and bad frames are counted.
         metrics: Of the whole server.
-        stop: Called with reason and source when a frame says stop; must not wait.
         diary: Notes what was seen.
     """
 
@@ -34,20 +32,18 @@ class FrameWork:
         self,
         slot: FrameSlot,
         worker: FrameWorker,
-        images: Executor,
+        thread: Executor,
         outbox: Outbox,
         counted: BadMessages,
         metrics: Metrics,
-        stop: Callable[[str, str], None],
         diary: SessionDiary,
     ) -> None:
         self._slot = slot
         self._worker = worker
-        self._images = images
+        self._thread = thread
         self._outbox = outbox
         self._counted = counted
         self._metrics = metrics
-        self._stop = stop
         self._diary = diary
 
     async def run(self) -> None:
@@ -66,8 +62,7 @@ class FrameWork:
                     if ended["phase"] == "end":
                         self._diary.ended()
                 continue
-            running = loop.run_in_executor(self._images, self._worker.run, job)
-            running.add_done_callback(self._heed_stop)
+            running = loop.run_in_executor(self._thread, self._worker.run, job)
             try:
                 # Shielded: a stop that is shown counts although the browser goes meanwhile.
                 done = await asyncio.shield(running)
@@ -82,11 +77,3 @@ class FrameWork:
             for message in done.messages:
                 self._outbox.put(message)
             self._diary.saw(job, done)
-
-    def _heed_stop(self, running: asyncio.Future[FrameDone]) -> None:
-        """A frame has been looked at: if it says stop, stop."""
-        if running.cancelled() or running.exception() is not None:
-            return
-        stop = running.result().decision.stop
-        if stop is not None:
-            self._stop(stop.reason, "gesture")

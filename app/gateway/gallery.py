@@ -4,22 +4,22 @@ import hashlib
 import logging
 import threading
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
 from sqlalchemy import make_url
 from sqlalchemy.exc import ArgumentError
 
 from app.config import PipelineSettings, Settings
 from app.errors import NotFound
+from app.gateway.learning import Pairs, fit
 from app.gestures import Gesture, GestureStore
 from app.gestures.backup import Place
 from app.gestures.records import SHARED
 from app.gestures.recovery import Hold, check_there, open_or_set_aside
 from app.link.actions import Action
-from app.pipeline import Gallery, PcaMatcher, unpack_template
+from app.pipeline import PcaMatcher
 from app.private import private_file, private_folder
 from app.robot.models import load_model
 
@@ -98,24 +98,6 @@ def open_for_server(settings: Settings) -> tuple[GestureStore, Hold | None]:
         raise
 
 
-Progress = Callable[[int, int], None]
-"""Told how much is done, of how much; what it raises ends the work."""
-Pairs = Sequence[tuple[str, bytes]]
-"""Name and template (600 bytes) of every active sample."""
-
-
-def fit(
-    templates: Pairs,
-    settings: PipelineSettings,
-    progress: Progress = lambda done, total: None,
-) -> PcaMatcher:
-    """A matcher for these samples."""
-    images = [unpack_template(template) for _, template in templates]
-    stacked = np.stack(images) if images else np.zeros((0, 80, 60), np.uint8)
-    gallery = Gallery(labels=tuple(name for name, _ in templates), templates=stacked)
-    return PcaMatcher.fit(gallery, settings.match, progress)
-
-
 def build_matcher(
     store: GestureStore, settings: PipelineSettings, gallery: str = SHARED
 ) -> PcaMatcher:
@@ -152,6 +134,9 @@ class LiveGallery:
     """
 
     def __init__(self, store: GestureStore, settings: PipelineSettings) -> None:
+        self.learn: Callable[[Pairs, PipelineSettings], PcaMatcher] = fit
+        """Makes a matcher. Takes long, and would hold up everything in the process of a server,
+        which puts another in its place."""
         self._store = store
         self._settings = settings
         self._lock = threading.Lock()
@@ -202,17 +187,16 @@ class LiveGallery:
                 self._forget_unused()
             return found
 
-    def prepare(self, pairs: Pairs, progress: Progress) -> None:
-        """Learn what a gallery is about to hold, so that :meth:`refresh` need not.
+    def prepared(self, pairs: Pairs, matcher: PcaMatcher) -> None:
+        """Take what was learned of what a gallery is about to hold: :meth:`refresh` need not.
 
-        Takes as long as fitting a matcher; not for the event loop. The newest is kept, until a
-        gallery holds it.
+        The newest is kept, until a gallery holds it.
 
         Args:
             pairs: What it will hold.
-            progress: As for :meth:`PcaMatcher.fit <app.pipeline.PcaMatcher.fit>`.
+            matcher: Fitted to that.
         """
-        self._prepared = _digest(pairs), fit(pairs, self._settings, progress)
+        self._prepared = _digest(pairs), matcher
 
     def refresh(self) -> bool:
         """Read the galleries in use again if anything changed, whichever process changed it.
@@ -247,23 +231,28 @@ class LiveGallery:
         content = tuple(gesture for gesture in self._store.list(id) if gesture.active)
         if before is not None and before.content == content:
             return before
-        pairs = [
-            (gesture.name, sample.template) for gesture in content for sample in gesture.samples
-        ]
+        pairs = _pairs(content)
         actions = {gesture.name: gesture.action for gesture in content}
-        return Enrolled(version, self._matcher(pairs), actions, id, content)
+        # What gestures do is changed more often than how they look.
+        same = before is not None and _digest(_pairs(before.content)) == _digest(pairs)
+        matcher = before.matcher if before is not None and same else self._matcher(pairs)
+        return Enrolled(version, matcher, actions, id, content)
 
     def _matcher(self, pairs: Pairs) -> PcaMatcher:
         prepared = self._prepared
         if prepared is not None and prepared[0] == _digest(pairs):
             self._prepared = None
             return prepared[1]
-        return fit(pairs, self._settings)
+        return self.learn(pairs, self._settings)
 
     def _forget_unused(self) -> None:
         unused = [id for id in self._fitted if self._users[id] <= 0]
         for id in unused[:-SPARE]:
             del self._fitted[id]
+
+
+def _pairs(content: Iterable[Gesture]) -> Pairs:
+    return [(gesture.name, sample.template) for gesture in content for sample in gesture.samples]
 
 
 def _digest(pairs: Pairs) -> bytes:

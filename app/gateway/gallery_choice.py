@@ -1,17 +1,25 @@
 """The gallery that one session is recognised against."""
 
-import asyncio
+from collections.abc import Awaitable, Callable
 
 from app.errors import NotFound
 from app.gateway.gallery import Enrolled, LiveGallery
 from app.gestures.records import SHARED
 
+Learn = Callable[[Callable[[str], Enrolled], str], Awaitable[Enrolled]]
+
 
 class GalleryChoice:
-    """The shared gallery, until another is chosen. Used on the event loop."""
+    """The shared gallery, until another is chosen. Used on the event loop.
 
-    def __init__(self, live: LiveGallery) -> None:
+    Args:
+        live: All galleries.
+        learn: Calls, on a thread, a function that gives a gallery by its id.
+    """
+
+    def __init__(self, live: LiveGallery, learn: Learn) -> None:
         self._live = live
+        self._learn = learn
         self.id = SHARED
         """Id of the gallery."""
         live.join(SHARED)
@@ -29,7 +37,7 @@ class GalleryChoice:
         """
         self._live.join(id)
         try:
-            await asyncio.to_thread(self._live.of, id)
+            await self._learn(self._live.of, id)
             if self._live.known(id) is None:
                 raise NotFound("the gallery has just been deleted", id=id)
         except BaseException:

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import functools
 import logging
 import time
 from http import HTTPStatus
@@ -12,6 +13,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.errors import NotAllowed, NotFound, NotSignedIn, RequestError
 from app.gateway.auth import Gatekeeper, Identity
+from app.gateway.body_watch import STRANGER_S, WatchedBody
 from app.gateway.errors import error_body, error_response, unexpected_response
 from app.gateway.fetch_metadata import is_foreign
 from app.gateway.page_secret import hide_proof
@@ -57,12 +59,16 @@ class Guard:
         app: What is behind the door.
         gatekeeper: Who may come in.
         prefix: The path below which a proxy shows this server; empty: none.
+        body_s: How long a request's body may take to arrive.
     """
 
-    def __init__(self, app: ASGIApp, gatekeeper: Gatekeeper, prefix: str = "") -> None:
+    def __init__(
+        self, app: ASGIApp, gatekeeper: Gatekeeper, prefix: str = "", body_s: float = 120.0
+    ) -> None:
         self._app = app
         self._gatekeeper = gatekeeper
         self._prefix = prefix
+        self._body_s = body_s
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Admit or refuse."""
@@ -171,6 +177,10 @@ class Guard:
         self, scope: Scope, receive: Receive, send: Send, identity: Identity | None
     ) -> None:
         """Let the application answer, as long as the token lives."""
+        if scope["type"] == "http":
+            body_s = self._body_s if identity is not None else min(self._body_s, STRANGER_S)
+            judge = functools.partial(self._gatekeeper.connections.check, identity)
+            receive = WatchedBody(scope, receive, body_s, judge)
         if identity is None:
             await self._app(scope, receive, send)
             return

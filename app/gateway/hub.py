@@ -1,7 +1,9 @@
 """Everything that lives as long as the server: opened in order, closed in the opposite one."""
 
 import asyncio
+import functools
 import logging
+import time
 from collections.abc import AsyncIterator, Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AsyncExitStack, asynccontextmanager
@@ -10,9 +12,11 @@ from importlib.metadata import PackageNotFoundError, version
 from app.config import Settings
 from app.errors import DatabaseBroken, NotAllowed, RobotUnavailable
 from app.gateway.backup_keeper import BackupKeeper
+from app.gateway.busy import BoundedThreads, Slots
 from app.gateway.diary import Diary
 from app.gateway.gallery import LiveGallery, open_for_server, place_of
-from app.gateway.jobs import Jobs
+from app.gateway.jobs import MOST_RUNNING, Jobs
+from app.gateway.learning import fit
 from app.gateway.lease_keeper import check_reply
 from app.gateway.metrics import Metrics
 from app.gateway.numbers import Counter, tick_ms
@@ -21,18 +25,35 @@ from app.gateway.people import People
 from app.gateway.relay import Relay
 from app.gateway.robot_port import RobotPort
 from app.gateway.viser_scene import ViserScene
+from app.gateway.work_pool import WorkPool
 from app.gestures import GestureStore
-from app.link.messages import LeaseReply, LeaseRequest, StopRequest
+from app.link.messages import (
+    DryRunReport,
+    DryRunRequest,
+    LeaseReply,
+    LeaseRequest,
+    State,
+    StopRequest,
+)
 
 log = logging.getLogger(__name__)
 
 LINK_THREADS = 4
+MOST_EXPORTS = 2
+"""Galleries that are sent as a file at once."""
 STOP_THREADS = 4
 """A stop never waits for a thread that a silent robot keeps busy."""
 
 
+DATABASE_THREADS, DATABASE_WAITING = 4, 64
+LEARN_THREADS, LEARN_WAITING = 2, 64
+LEARN_NICENESS = 5
+"""What a session waits for after a change is not as far behind everything else as uploads are."""
+LEARN_MEMORY = 4
+"""Times what a picture may take."""
 CONFIRM_RESET_S = 1.0
 """So long a state is waited for that shows what the robot has agreed to."""
+STATE_CHECK_S = 0.01
 
 
 def package_version() -> str:
@@ -53,7 +74,6 @@ class Hub:
         gallery: LiveGallery,
         keeper: BackupKeeper,
         robot: RobotPort,
-        images: ThreadPoolExecutor,
         viser: ViserScene | None,
     ) -> None:
         self.settings = settings
@@ -61,7 +81,6 @@ class Hub:
         self.gallery = gallery
         self.keeper = keeper
         self.robot = robot
-        self.images = images
         self.viser = viser
         self.version = package_version()
         self.metrics = Metrics()
@@ -77,6 +96,28 @@ class Hub:
         self.checking = asyncio.Lock()
         """Held while a program is being checked."""
         self.jobs = Jobs()
+        self.uploads = Slots(
+            limits.max_uploads,
+            f"{limits.max_uploads} uploads are under way, which is the most; try again",
+        )
+        """Held while an upload is read or worked on."""
+        self.exports = Slots(
+            MOST_EXPORTS, f"{MOST_EXPORTS} exports are under way, which is the most; try again"
+        )
+        self.database = BoundedThreads("database", DATABASE_THREADS, DATABASE_WAITING)
+        """For what requests read and write. Nothing that stops or drives waits for these."""
+        self.learners = BoundedThreads("gallery", LEARN_THREADS, LEARN_WAITING)
+        """For those who wait until a gallery is learned."""
+        memory = limits.work_mib << 20
+        nice = limits.work_niceness
+        self.pictures = WorkPool(limits.workers, 2 * limits.max_uploads, memory, nice)
+        self.long_work = WorkPool(MOST_RUNNING, MOST_RUNNING, LEARN_MEMORY * memory, nice)
+        self._learning = WorkPool(
+            1, LEARN_WAITING, LEARN_MEMORY * memory, min(nice, LEARN_NICENESS)
+        )
+        gallery.learn = functools.partial(self._learning.call, fit)
+        self._dry_run_thread = ThreadPoolExecutor(1, "dry-run")
+        self._refresh_thread = ThreadPoolExecutor(1, "refresh")
         self._link_threads = ThreadPoolExecutor(LINK_THREADS, "link")
         self._stop_threads = ThreadPoolExecutor(STOP_THREADS, "stop")
         self._told_version = gallery.version
@@ -109,13 +150,11 @@ class Hub:
             robot = RobotPort(settings)
             stack.push_async_callback(asyncio.to_thread, robot.close)
             robot.start()
-            images = ThreadPoolExecutor(settings.gateway.workers, "image")
-            stack.callback(images.shutdown, wait=False, cancel_futures=True)
             viser: ViserScene | None = None
             if settings.gateway.viser:
                 viser = ViserScene(robot, settings.robot.profile)
                 stack.push_async_callback(asyncio.to_thread, viser.close)
-            hub = cls(settings, store, gallery, keeper, robot, images, viser)
+            hub = cls(settings, store, gallery, keeper, robot, viser)
             stack.push_async_callback(hub._close)
             deadline = asyncio.get_running_loop().time() + settings.gateway.ready_wait_s
             while (
@@ -141,7 +180,16 @@ class Hub:
         await self.jobs.close()
         await self.diary.close()
         await self.relay.close()
-        for pool in (self._link_threads, self._stop_threads):
+        for work in (self.pictures, self.long_work, self._learning):
+            await asyncio.to_thread(work.close)
+        for threads in (self.database, self.learners):
+            threads.close()
+        for pool in (
+            self._link_threads,
+            self._stop_threads,
+            self._dry_run_thread,
+            self._refresh_thread,
+        ):
             pool.shutdown(wait=False, cancel_futures=True)
 
     async def ask(self, request: LeaseRequest) -> LeaseReply:
@@ -184,7 +232,12 @@ class Hub:
         """
         check_reply(await self.ask(LeaseRequest(kind="reset", holder=source[:80])))
         # What is told next should show it already; a state may have been on its way meanwhile.
-        await asyncio.to_thread(self.robot.wait_reset, CONFIRM_RESET_S)
+        await self._newer_state(
+            lambda state: (
+                state.mode != "stopped"
+                and state.latch.status == self.robot.stop_memory.kept.status == "none"
+            )
+        )
 
     async def reset_scene(self, source: str) -> None:
         """Put every movable thing back where it was at first.
@@ -194,11 +247,30 @@ class Hub:
             RobotUnavailable: no answer came in time.
         """
         check_reply(await self.ask(LeaseRequest(kind="reset_scene", holder=source[:80])))
-        await asyncio.to_thread(self.robot.wait_newer, CONFIRM_RESET_S)
+        await self._newer_state()
+
+    async def _newer_state(self, so: Callable[[State], bool] = lambda _: True) -> None:
+        """Wait a little for a state that comes after this call and is so. Takes no thread."""
+        since = time.monotonic()
+        while time.monotonic() - since < CONFIRM_RESET_S:
+            if self.robot.has_newer(since, so):
+                return
+            await asyncio.sleep(STATE_CHECK_S)
+
+    async def dry_run(self, request: DryRunRequest) -> DryRunReport:
+        """Ask what an action would do; nothing moves. One at a time.
+
+        Raises:
+            Busy: another is under way.
+            RobotUnavailable: no answer came in time.
+        """
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(self._dry_run_thread, self.robot.dry_run, request)
 
     async def gallery_changed(self) -> None:
         """Read the gestures again if they changed, and tell every session."""
-        await asyncio.to_thread(self.gallery.refresh)
+        loop = asyncio.get_running_loop()
+        await loop.run_in_executor(self._refresh_thread, self.gallery.refresh)
         current = self.gallery.version
         if current != self._told_version:
             self._told_version = current

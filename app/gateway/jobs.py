@@ -10,10 +10,12 @@ import secrets
 import threading
 import time
 from collections.abc import Awaitable, Callable
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from app.errors import FarhandError, NotFound, RequestError
+from app.gateway.busy import Busy
 from app.gateway.errors import INTERNAL_MESSAGE, error_body
+from app.gateway.work_pool import LONG_CPU_S, Ended, Task, WorkPool
 
 log = logging.getLogger(__name__)
 
@@ -23,15 +25,10 @@ KEPT_S = 600.0
 """How long it can be asked how a job ended."""
 MOST_KEPT = 20
 
+T = TypeVar("T")
 State = Literal["running", "done", "failed", "cancelled"]
+_CANCELLED = "it was cancelled; nothing was changed"
 Work = Callable[["Job"], Awaitable[dict[str, Any]]]
-
-
-class Busy(RequestError):
-    """As much of this kind of work is done at once as may be."""
-
-    default_code = "busy"
-    status = 429
 
 
 class Cancelled(RequestError):
@@ -57,6 +54,7 @@ class Job:
         self.error: dict[str, Any] | None = None
         self.ended_at = 0.0
         self._cancel = threading.Event()
+        self._task: Task | None = None
 
     def progress(self, done: int, total: int) -> None:
         """Say how far it is, and end here if somebody cancelled it.
@@ -65,12 +63,55 @@ class Job:
             Cancelled: somebody did.
         """
         if self._cancel.is_set():
-            raise Cancelled("it was cancelled; nothing was changed")
+            raise Cancelled(_CANCELLED)
         self.done, self.total = done, total
 
     def cancel(self) -> None:
-        """End it where it next says how far it is. Once it has done its work nothing changes."""
+        """End it: what runs in a process at once, else where it next says how far it is.
+
+        Once it has done its work nothing changes.
+        """
         self._cancel.set()
+        if self._task is not None:
+            self._task.cancel()
+
+    async def run(
+        self,
+        pool: WorkPool,
+        function: Callable[..., T],
+        *arguments: Any,
+        progress: Callable[[int, int], None] | None = None,
+        cpu_s: float = LONG_CPU_S,
+        memory: int | None = None,
+    ) -> T:
+        """Have a part of the job done in a process, which ends when the job is cancelled.
+
+        Args:
+            pool: Whose process.
+            function: See :meth:`WorkPool.submit <app.gateway.work_pool.WorkPool.submit>`.
+            arguments: Of the function.
+            progress: In place of :meth:`progress`.
+            cpu_s: Processor time that it may take.
+            memory: Bytes that it may take; None: what the pool allows.
+
+        Raises:
+            Cancelled: somebody cancelled the job.
+            Busy, TooMuchWork: as :meth:`WorkPool.run <app.gateway.work_pool.WorkPool.run>`.
+        """
+        self._task = pool.submit(
+            function, *arguments, progress=progress or self.progress, cpu_s=cpu_s, memory=memory
+        )
+        try:
+            if self._cancel.is_set():
+                self._task.cancel()
+            result: T = await asyncio.wrap_future(self._task.future)
+        except (Ended, asyncio.CancelledError):
+            if not self._cancel.is_set():
+                raise
+            raise Cancelled(_CANCELLED) from None
+        finally:
+            self._task = None
+        return result
 
     def as_json(self) -> dict[str, Any]:
         """As the REST interface shows it."""

@@ -1,14 +1,13 @@
 """REST: would a program break a limit, and where? And the path in the 3D view of who asks."""
 
-import asyncio
 from typing import Any
 
 from fastapi import APIRouter, Request
 
 from app.errors import Invalid, RobotUnavailable
 from app.gateway.bodies import DRY_RUN_BODY
+from app.gateway.busy import Busy
 from app.gateway.errors import BAD_BODY
-from app.gateway.jobs import Busy
 from app.gateway.json_bodies import parse_action, read_object
 from app.gateway.rest_robots import robot_of
 from app.gateway.viser_rehearsal import VIEW_ID
@@ -50,7 +49,7 @@ async def dry_run(request: Request, id: str) -> dict[str, Any]:
     if hub.checking.locked():
         raise Busy("another program is being checked; try again in a moment")
     async with hub.checking:  # one thread at a time waits for an answer
-        report = await asyncio.to_thread(robot.dry_run, question)
+        report = await hub.dry_run(question)
     if report.code == "busy":
         raise Busy(report.reason)
     if report.code in ("robot_unavailable", "internal"):

@@ -1,19 +1,22 @@
 """REST: a gallery as one file, out and in."""
 
-import asyncio
 import re
-from collections.abc import Iterator
+from collections.abc import AsyncIterator
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Request
+from starlette.concurrency import iterate_in_threadpool
 from starlette.responses import StreamingResponse
 
 from app.gateway.bodies import ZIP_BODY
+from app.gateway.body_watch import still_allowed
 from app.gateway.errors import BAD_BODY
 from app.gateway.jobs import Job
+from app.gateway.learning import fit
 from app.gateway.rest_gestures import hub_of
 from app.gateway.undo_offer import UndoOffer
 from app.gateway.uploads import read_file
+from app.gateway.work_pool import CPU_S
 from app.gestures.exchange import entries_of
 from app.gestures.importing import Existing, Plan, import_entries, plan_of
 from app.gestures.setfile import read_zip
@@ -24,6 +27,8 @@ if TYPE_CHECKING:
 
 router = APIRouter(prefix="/api", tags=["galleries"])
 
+READ_BYTES = 512 << 20
+"""Memory that reading a file may take: it unpacks to 64 MiB at most."""
 ZIP_TYPES = ("application/zip", "application/x-zip-compressed", "application/octet-stream")
 
 
@@ -38,13 +43,19 @@ ZIP_TYPES = ("application/zip", "application/x-zip-compressed", "application/oct
 )
 async def export_gallery(request: Request, id: str) -> StreamingResponse:
     """All its gestures, streamed gesture by gesture. Who hangs up ends it."""
-    store = hub_of(request).store
-    gallery = await asyncio.to_thread(store.galleries.get, id)
-    entries = entries_of(await asyncio.to_thread(store.list, id))
+    hub = hub_of(request)
+    hub.exports.check()
+    gallery = await hub.database(hub.store.galleries.get, id)
+    entries = entries_of(await hub.database(hub.store.list, id))
     plain = re.sub(r"[^a-z0-9]+", "-", gallery.name.lower()).strip("-") or "gestures"
-    stream: Iterator[bytes] = zip_stream(entries)
+
+    async def stream() -> AsyncIterator[bytes]:
+        with hub.exports.one():
+            async for part in iterate_in_threadpool(zip_stream(entries)):
+                yield part
+
     return StreamingResponse(
-        stream,
+        stream(),
         media_type="application/zip",
         headers={"Content-Disposition": f'attachment; filename="farhand-{plain}.zip"'},
     )
@@ -76,27 +87,26 @@ async def start_import(
     """A job: reads the whole file, learns it, then takes in all of it or nothing."""
     hub = hub_of(request)
     hub.jobs.check_free()
-    await asyncio.to_thread(hub.store.galleries.get, id)
-    data = await read_file(request, hub.settings.gateway.max_import_bytes, ZIP_TYPES)
+    await hub.database(hub.store.galleries.get, id)
+    with hub.uploads.one():
+        data = await read_file(request, hub.settings.gateway.max_import_bytes, ZIP_TYPES)
     kind: Literal["import", "import_check"] = "import_check" if check else "import"
 
     async def work(job: Job) -> dict[str, Any]:
         if check:
-            return await asyncio.to_thread(_check, hub, data, id, existing, job)
+            entries = await job.run(hub.long_work, read_zip, data, cpu_s=CPU_S, memory=READ_BYTES)
+            there = await hub.database(hub.store.list, id)
+            planned = await hub.database(plan_of, there, entries, existing)
+            return {**plan_json(planned, existing), "change": None}
         offer = UndoOffer(hub.store)
-        done = await asyncio.to_thread(_import, hub, data, id, existing, plan, job, offer)
+        done = await _import(hub, data, id, existing, plan, job, offer, request)
         await hub.gallery_changed()
         return {**plan_json(done, existing), "change": offer.made}
 
     return hub.jobs.start(kind, work).as_json()
 
 
-def _check(hub: "Hub", data: bytes, id: str, existing: Existing, job: Job) -> dict[str, Any]:
-    entries = read_zip(data, job.progress)
-    return {**plan_json(plan_of(hub.store.list(id), entries, existing), existing), "change": None}
-
-
-def _import(
+async def _import(
     hub: "Hub",
     data: bytes,
     id: str,
@@ -104,19 +114,34 @@ def _import(
     expected: str | None,
     job: Job,
     offer: UndoOffer,
+    request: Request,
 ) -> Plan:
     # A third of the way each: to read it, to learn what the gallery will hold, to write it.
     # Learning takes longest, and comes before anything is changed, so that it can be cancelled.
-    entries = read_zip(data, lambda done, total: job.progress(done, 3 * total))
+    entries = await job.run(
+        hub.long_work,
+        read_zip,
+        data,
+        progress=lambda done, total: job.progress(done, 3 * total),
+        cpu_s=CPU_S,
+        memory=READ_BYTES,
+    )
     read = len(entries)
-    there = hub.store.list(id)
-    planned = plan_of(there, entries, existing)
+    there = await hub.database(hub.store.list, id)
+    planned = await hub.database(plan_of, there, entries, existing)
     if planned.entries and expected in (None, planned.digest):  # else it is refused below
-        hub.gallery.prepare(
-            planned.after(there),
-            lambda done, total: job.progress(read + read * done // total, 3 * read),
+        pairs = planned.after(there)
+        matcher = await job.run(
+            hub.long_work,
+            fit,
+            pairs,
+            hub.settings.pipeline,
+            progress=lambda done, total: job.progress(read + read * done // total, 3 * read),
         )
-    return import_entries(
+        hub.gallery.prepared(pairs, matcher)
+    still_allowed(request)
+    return await hub.database(
+        import_entries,
         hub.store,
         entries,
         existing,

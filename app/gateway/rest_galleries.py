@@ -1,6 +1,5 @@
 """REST: several people keep galleries of their own."""
 
-import asyncio
 import contextlib
 from typing import Any
 
@@ -32,7 +31,8 @@ def gallery_json(gallery: Gallery) -> dict[str, Any]:
 @router.get("/galleries", summary="All galleries")
 async def list_galleries(request: Request) -> list[dict[str, Any]]:
     """The shared gallery, then the others in the order in which they were made."""
-    galleries = await asyncio.to_thread(hub_of(request).store.galleries.list)
+    hub = hub_of(request)
+    galleries = await hub.database(hub.store.galleries.list)
     return [gallery_json(gallery) for gallery in galleries]
 
 
@@ -51,7 +51,7 @@ async def create_gallery(request: Request) -> dict[str, Any]:
     """It begins as a copy of the shared gallery: ``{"name": ...}``."""
     hub = hub_of(request)
     name = await _name(request)
-    gallery = await asyncio.to_thread(hub.store.galleries.create, name)
+    gallery = await hub.database(hub.store.galleries.create, name)
     await hub.gallery_changed()
     return gallery_json(gallery)
 
@@ -71,7 +71,7 @@ async def rename_gallery(request: Request, id: str) -> dict[str, Any]:
     """Give a gallery another name: ``{"name": ...}``."""
     hub = hub_of(request)
     name = await _name(request)
-    gallery = await asyncio.to_thread(hub.store.galleries.rename, id, name)
+    gallery = await hub.database(hub.store.galleries.rename, id, name)
     await hub.gallery_changed()
     return gallery_json(gallery)
 
@@ -88,10 +88,10 @@ async def rename_gallery(request: Request, id: str) -> dict[str, Any]:
 async def delete_gallery(request: Request, id: str) -> Response:
     """Forget a gallery with all its gestures; who uses it goes on with the shared one."""
     hub = hub_of(request)
-    await asyncio.to_thread(hub.store.galleries.delete, id)
+    await hub.database(hub.store.galleries.delete, id)
     # The diary forgets those that it knew; one that came and went between two of its looks, here.
     with contextlib.suppress(FarhandError):
-        await asyncio.to_thread(lambda: hub.diary.settings.forget(id))
+        await hub.database(lambda: hub.diary.settings.forget(id))
     await hub.gallery_changed()
     return Response(status_code=204)
 

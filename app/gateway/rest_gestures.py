@@ -1,31 +1,34 @@
 """REST: the gesture database, and recognising one image."""
 
-import asyncio
 from typing import TYPE_CHECKING, Annotated, Any
 
 from fastapi import APIRouter, Query, Request
 from starlette.responses import Response
 
-from app.config import PipelineSettings
 from app.errors import ImageRefused, Invalid, NotFound
 from app.gateway.bodies import CHECK_BODY, ENROL_BODY, IMAGE_BODY, SAMPLES_BODY
+from app.gateway.body_watch import still_allowed
+from app.gateway.connected import while_connected
 from app.gateway.enrolment import (
     Judged,
-    confusions_json,
+    found_json,
     judge,
     judge_for_enrolment,
     matrix_json,
-    run,
+    set_of,
+    sets_of,
 )
 from app.gateway.errors import BAD_BODY
 from app.gateway.gallery import Enrolled
 from app.gateway.json_bodies import parse_action, parse_json
 from app.gateway.undo_offer import UndoOffer
 from app.gateway.uploads import read_enrolment, read_image
+from app.gateway.work_pool import LONG_CPU_S
 from app.gestures import Gesture, template_png
 from app.gestures.records import SHARED, clean_name
 from app.link.actions import ACTION
 from app.pipeline import extract_template
+from app.pipeline.confusion import compare
 
 if TYPE_CHECKING:
     from app.gateway.hub import Hub
@@ -65,7 +68,8 @@ def hub_of(request: Request) -> "Hub":
 )
 async def list_gestures(request: Request, gallery: GalleryId = SHARED) -> list[dict[str, Any]]:
     """All gestures, in the order in which they were enrolled."""
-    gestures = await asyncio.to_thread(hub_of(request).store.list, gallery)
+    hub = hub_of(request)
+    gestures = await hub.database(hub.store.list, gallery)
     return [gesture_json(gesture) for gesture in gestures]
 
 
@@ -88,6 +92,11 @@ async def create_gesture(request: Request, response: Response) -> dict[str, Any]
     With ``burst`` the images are the frames of a few seconds, of which the best are kept.
     """
     hub = hub_of(request)
+    with hub.uploads.one():
+        return await _create(hub, request, response)
+
+
+async def _create(hub: "Hub", request: Request, response: Response) -> dict[str, Any]:
     known = {"name", "action", "active", "gallery"}
     upload = await read_enrolment(request, hub.settings.gateway, known)
     for field in ("name", "action"):
@@ -97,11 +106,16 @@ async def create_gesture(request: Request, response: Response) -> dict[str, Any]
     name = clean_name(upload.fields["name"])
     action = parse_action(parse_json(upload.fields["action"], "action"))
     gallery = upload.gallery
-    await asyncio.to_thread(hub.store.galleries.get, gallery)
-    judged = await judge_for_enrolment(hub, upload.images, burst=upload.burst)
-    confusions = await confusions_of(hub, gallery, name, judged.templates)
+    await hub.database(hub.store.galleries.get, gallery)
+
+    async def look() -> tuple[Judged, list[dict[str, Any]]]:
+        judged = await judge_for_enrolment(hub, upload.images, burst=upload.burst)
+        return judged, await confusions_of(hub, gallery, name, judged.templates)
+
+    judged, confusions = await while_connected(request, look())
+    still_allowed(request)
     offer = UndoOffer(hub.store)
-    gesture = await asyncio.to_thread(
+    gesture = await hub.database(
         hub.store.create,
         name,
         action,
@@ -124,14 +138,29 @@ async def confusions_of(
     Raises:
         NotFound: no gallery has this id.
     """
-    gestures = await asyncio.to_thread(hub.store.list, gallery)
-    settings, threshold = hub.settings.pipeline, await _threshold(hub, gallery)
-    return await run(hub, confusions_json, gestures, settings, threshold, name, templates, besides)
+    gestures = await hub.database(hub.store.list, gallery)
+    others = [gesture for gesture in gestures if gesture.id != besides]
+    if not templates or not others:
+        return []
+    sets, threshold = sets_of(name, templates, others), await _threshold(hub, gallery)
+    match = hub.settings.pipeline.match
+    found = await hub.pictures.run(compare, sets, match, threshold, [0], cpu_s=LONG_CPU_S)
+    return found_json(found, others, threshold)
+
+
+async def enrolled_in(hub: "Hub", gallery: str) -> Enrolled:
+    """What a gallery holds; it is learned first, where nobody uses it.
+
+    Raises:
+        NotFound: no gallery has this id.
+    """
+    known = hub.gallery.known(gallery)
+    return await hub.learners(hub.gallery.of, gallery) if known is None else known
 
 
 async def _threshold(hub: "Hub", gallery: str) -> float:
     """Largest distance at which a match is accepted."""
-    return (await asyncio.to_thread(hub.gallery.of, gallery)).matcher.max_distance
+    return (await enrolled_in(hub, gallery)).matcher.max_distance
 
 
 def _enrolled_json(
@@ -155,12 +184,17 @@ def _enrolled_json(
 async def check_gesture(request: Request) -> dict[str, Any]:
     """Judge images before they are enrolled: are they good, and what may be confused with them?"""
     hub = hub_of(request)
+    with hub.uploads.one():
+        return await _check(hub, request)
+
+
+async def _check(hub: "Hub", request: Request) -> dict[str, Any]:
     known = {"name", "action", "active", "gesture", "gallery"}
     upload = await read_enrolment(request, hub.settings.gateway, known)
     upload.flag("active", True)
     name, besides, samples, gallery = "the new gesture", None, [], upload.gallery
     if "gesture" in upload.fields:
-        gesture = await asyncio.to_thread(hub.store.get, upload.fields["gesture"])
+        gesture = await hub.database(hub.store.get, upload.fields["gesture"])
         if "gallery" in upload.fields and gallery != gesture.gallery:
             raise Invalid("'gesture' is not in 'gallery'; leave one of them out", field="gallery")
         name, besides, gallery = gesture.name, gesture.id, gesture.gallery
@@ -169,10 +203,15 @@ async def check_gesture(request: Request) -> dict[str, Any]:
         name = clean_name(upload.fields["name"])
     if "action" in upload.fields:
         parse_action(parse_json(upload.fields["action"], "action"))
-    judged = await judge(hub, upload.images, burst=upload.burst)
-    confusions: list[dict[str, Any]] = []
-    if judged.kept:
-        confusions = await confusions_of(hub, gallery, name, samples + judged.templates, besides)
+
+    async def look() -> tuple[Judged, list[dict[str, Any]]]:
+        judged = await judge(hub, upload.images, burst=upload.burst)
+        if not judged.kept:
+            return judged, []
+        templates = samples + judged.templates
+        return judged, await confusions_of(hub, gallery, name, templates, besides)
+
+    judged, confusions = await while_connected(request, look())
     return {
         "images": judged.images_json(),
         "accepted": len(judged.kept),
@@ -190,14 +229,19 @@ async def check_gesture(request: Request) -> dict[str, Any]:
 async def list_confusions(request: Request, gallery: GalleryId = SHARED) -> dict[str, Any]:
     """All gestures against all others, active or not, and what would help."""
     hub = hub_of(request)
-    version = await asyncio.to_thread(lambda: hub.store.version)
+    version = await hub.database(lambda: hub.store.version)
     cached: tuple[int, dict[str, Any]] = getattr(request.app.state, "confusions", (version, {}))
     answers = cached[1] if cached[0] == version else {}
     answer: dict[str, Any] | None = answers.get(gallery)
     if answer is None:
-        gestures = await asyncio.to_thread(hub.store.list, gallery)
+        gestures = await hub.database(hub.store.list, gallery)
         threshold = await _threshold(hub, gallery)
-        answer = await run(hub, matrix_json, gestures, hub.settings.pipeline, threshold)
+        sets = [set_of(gesture) for gesture in gestures]
+        match = hub.settings.pipeline.match
+        found = await while_connected(
+            request, hub.pictures.run(compare, sets, match, threshold, cpu_s=LONG_CPU_S)
+        )
+        answer = matrix_json(found, gestures, threshold)
         request.app.state.confusions = version, {**answers, gallery: answer}
     return answer
 
@@ -205,7 +249,8 @@ async def list_confusions(request: Request, gallery: GalleryId = SHARED) -> dict
 @router.get("/gestures/{id}", summary="One gesture", responses={404: {"description": "unknown id"}})
 async def get_gesture(request: Request, id: str) -> dict[str, Any]:
     """One gesture."""
-    return gesture_json(await asyncio.to_thread(hub_of(request).store.get, id))
+    hub = hub_of(request)
+    return gesture_json(await hub.database(hub.store.get, id))
 
 
 @router.delete(
@@ -218,7 +263,7 @@ async def delete_gesture(request: Request, id: str) -> Response:
     """Forget a gesture and its samples."""
     hub = hub_of(request)
     offer = UndoOffer(hub.store)
-    await asyncio.to_thread(hub.store.delete, id, undo_as=offer.id)
+    await hub.database(hub.store.delete, id, undo_as=offer.id)
     await hub.gallery_changed()
     response = Response(status_code=204)
     offer.to(response)
@@ -245,14 +290,26 @@ async def add_samples(
 ) -> dict[str, Any]:
     """Enrol more images of a gesture: all of them, or none; of a burst the best."""
     hub = hub_of(request)
-    gesture = await asyncio.to_thread(hub.store.get, id)
+    with hub.uploads.one():
+        return await _add(hub, request, response, id, replace)
+
+
+async def _add(
+    hub: "Hub", request: Request, response: Response, id: str, replace: bool
+) -> dict[str, Any]:
+    before = await hub.database(hub.store.get, id)
     upload = await read_enrolment(request, hub.settings.gateway, set())
-    judged = await judge_for_enrolment(hub, upload.images, burst=upload.burst)
-    kept = [] if replace else [sample.template for sample in gesture.samples]
-    templates = kept + judged.templates
-    confusions = await confusions_of(hub, gesture.gallery, gesture.name, templates, id)
+
+    async def look() -> tuple[Judged, list[dict[str, Any]]]:
+        judged = await judge_for_enrolment(hub, upload.images, burst=upload.burst)
+        kept = [] if replace else [sample.template for sample in before.samples]
+        templates = kept + judged.templates
+        return judged, await confusions_of(hub, before.gallery, before.name, templates, id)
+
+    judged, confusions = await while_connected(request, look())
+    still_allowed(request)
     offer = UndoOffer(hub.store)
-    gesture = await asyncio.to_thread(
+    gesture = await hub.database(
         hub.store.add_samples, id, judged.templates, replace=replace, undo_as=offer.id
     )
     await hub.gallery_changed()
@@ -273,7 +330,8 @@ async def template(
     request: Request, id: str, sample: Annotated[int, Query(ge=0, le=100_000)] = 0
 ) -> Response:
     """The template of sample number ``sample``, counted from 0."""
-    gesture = await asyncio.to_thread(hub_of(request).store.get, id)
+    hub = hub_of(request)
+    gesture = await hub.database(hub.store.get, id)
     if sample >= len(gesture.samples):
         raise NotFound(
             f"{gesture.name} has {len(gesture.samples)} samples, counted from 0; "
@@ -284,12 +342,12 @@ async def template(
     return Response(png, media_type="image/png", headers={"Cache-Control": "private, max-age=60"})
 
 
-def _recognise(image: bytes, settings: PipelineSettings, enrolled: Enrolled) -> dict[str, Any]:
+async def _recognise(hub: "Hub", image: bytes, enrolled: Enrolled) -> dict[str, Any]:
     try:
-        extraction = extract_template(image, settings)
+        extraction = await hub.pictures.run(extract_template, image, hub.settings.pipeline)
     except ImageRefused as error:
         return {"match": None, "reason": error.message, "roi": None, "distances": {}}
-    matched = enrolled.matcher(extraction.views)
+    matched = await hub.learners(enrolled.matcher, extraction.views)
     match = matched.match
     found = None
     if match is not None and match.accepted:
@@ -317,9 +375,10 @@ def _recognise(image: bytes, settings: PipelineSettings, enrolled: Enrolled) -> 
 async def recognise(request: Request) -> dict[str, Any]:
     """An image in (multipart field ``image``, or the body itself), the match out."""
     hub = hub_of(request)
-    upload = await read_image(request, hub.settings.gateway.max_upload_bytes)
-    (image,) = upload.images
-    if not image:
-        raise Invalid("the image is empty", field="image")
-    enrolled = await asyncio.to_thread(hub.gallery.of, upload.gallery)
-    return await run(hub, _recognise, image, hub.settings.pipeline, enrolled)
+    with hub.uploads.one():
+        upload = await read_image(request, hub.settings.gateway.max_upload_bytes)
+        (image,) = upload.images
+        if not image:
+            raise Invalid("the image is empty", field="image")
+        enrolled = await enrolled_in(hub, upload.gallery)
+        return await while_connected(request, _recognise(hub, image, enrolled))

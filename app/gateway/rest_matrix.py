@@ -1,24 +1,18 @@
 """REST: how often the gestures of a gallery are taken for one another."""
 
-import asyncio
 from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
 
-from app.gateway.enrolment import run
 from app.gateway.gallery import Enrolled
 from app.gateway.jobs import Job
-from app.gateway.rest_gestures import hub_of
-from app.pipeline.match import PcaMatcher
-from app.pipeline.mix_ups import Answer, MixUps, answer, asked_of, tally
+from app.gateway.rest_gestures import enrolled_in, hub_of
+from app.pipeline.mix_ups import MixUps, try_all
 
 if TYPE_CHECKING:
     from app.gateway.hub import Hub
 
 router = APIRouter(prefix="/api", tags=["galleries"])
-
-AT_ONCE = 4
-"""Samples that are shown in one go; a few ms. Between two of these, live frames get their turn."""
 
 
 @router.post(
@@ -34,7 +28,7 @@ async def start_matrix(request: Request, id: str) -> dict[str, Any]:
     """A job: each sample of an active gesture is shown to the matcher, itself left out."""
     hub = hub_of(request)
     hub.jobs.check_free()
-    enrolled = await asyncio.to_thread(hub.gallery.of, id)
+    enrolled = await enrolled_in(hub, id)
     return hub.jobs.start("matrix", lambda job: mix_ups(hub, enrolled, job)).as_json()
 
 
@@ -44,18 +38,8 @@ async def mix_ups(hub: "Hub", enrolled: Enrolled, job: Job) -> dict[str, Any]:
     Raises:
         Cancelled: somebody cancelled the job.
     """
-    matcher = enrolled.matcher
-    asked = asked_of(matcher)
-    answers: list[Answer] = []
-    for first in range(0, len(asked), AT_ONCE):
-        job.progress(first, len(asked))
-        answers += await run(hub, _answers, matcher, asked[first : first + AT_ONCE])
-    job.progress(len(asked), len(asked))
-    return matrix_json(enrolled, tally([gesture.name for gesture in enrolled.content], answers))
-
-
-def _answers(matcher: PcaMatcher, indices: list[int]) -> list[Answer]:
-    return [answer(matcher, index) for index in indices]
+    names = [gesture.name for gesture in enrolled.content]
+    return matrix_json(enrolled, await job.run(hub.long_work, try_all, enrolled.matcher, names))
 
 
 def matrix_json(enrolled: Enrolled, found: MixUps) -> dict[str, Any]:

@@ -1,6 +1,5 @@
 """REST: changing what a gesture does, and the actions that it had."""
 
-import asyncio
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Request
@@ -62,7 +61,7 @@ async def update_gesture(request: Request, response: Response, id: str) -> dict[
         raise Invalid("version must be a whole number", field="version")
     action = parse_action(changes["action"]) if "action" in changes else None
     offer = UndoOffer(hub.store)
-    gesture = await asyncio.to_thread(
+    gesture = await hub.database(
         hub.store.update,
         id,
         name=name,
@@ -87,7 +86,8 @@ async def update_gesture(request: Request, response: Response, id: str) -> dict[
 )
 async def list_versions(request: Request, id: str) -> list[dict[str, Any]]:
     """All that are kept, oldest first; the last is in force."""
-    versions = await asyncio.to_thread(hub_of(request).store.versions, id)
+    hub = hub_of(request)
+    versions = await hub.database(hub.store.versions, id)
     return [version_json(version) for version in versions]
 
 
@@ -102,7 +102,7 @@ async def restore_version(
     """The action of that version becomes the newest version. The gesture."""
     hub = hub_of(request)
     offer = UndoOffer(hub.store)
-    gesture = await asyncio.to_thread(hub.store.restore, id, version, undo_as=offer.id)
+    gesture = await hub.database(hub.store.restore, id, version, undo_as=offer.id)
     await hub.gallery_changed()
     offer.to(response)
     return gesture_json(gesture)

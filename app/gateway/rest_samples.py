@@ -1,6 +1,5 @@
 """REST: single samples, and taking changes of gestures back."""
 
-import asyncio
 from typing import Any
 
 from fastapi import APIRouter, Request
@@ -28,7 +27,7 @@ async def delete_sample(
     """The gesture without it."""
     hub = hub_of(request)
     offer = UndoOffer(hub.store)
-    gesture = await asyncio.to_thread(hub.store.samples.remove, id, sample, undo_as=offer.id)
+    gesture = await hub.database(hub.store.samples.remove, id, sample, undo_as=offer.id)
     await hub.gallery_changed()
     offer.to(response)
     return gesture_json(gesture)
@@ -49,7 +48,7 @@ async def move_sample(
     if not isinstance(to, str):
         raise Invalid("to is the id of a gesture", field="to")
     offer = UndoOffer(hub.store)
-    both = await asyncio.to_thread(hub.store.samples.move, id, sample, to, undo_as=offer.id)
+    both = await hub.database(hub.store.samples.move, id, sample, to, undo_as=offer.id)
     await hub.gallery_changed()
     offer.to(response)
     return [gesture_json(gesture) for gesture in both]
@@ -67,7 +66,7 @@ async def undo_change(request: Request, response: Response, id: str) -> list[dic
     """The gestures that are there again, or as they were. This can be taken back in its turn."""
     hub = hub_of(request)
     offer = UndoOffer(hub.store)
-    gestures = await asyncio.to_thread(hub.store.undo, id, undo_as=offer.id)
+    gestures = await hub.database(hub.store.undo, id, undo_as=offer.id)
     await hub.gallery_changed()
     offer.to(response)
     return [gesture_json(gesture) for gesture in gestures]

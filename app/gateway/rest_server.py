@@ -1,6 +1,5 @@
 """REST: health, metrics, the synthetic operator, and the description of all of it."""
 
-import asyncio
 import logging
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +27,7 @@ async def health(request: Request) -> dict[str, Any]:
     hub: Hub = request.app.state.hub
     try:
         database = "ok"
-        await asyncio.to_thread(lambda: hub.store.version)
+        await hub.database(lambda: hub.store.version)
     except FarhandError as error:
         database = error.message
     database = hub.keeper.problem_for(identity.role) or database

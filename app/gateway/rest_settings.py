@@ -1,6 +1,5 @@
 """REST: what a person has chosen on the page."""
 
-import asyncio
 from typing import Any
 
 from fastapi import APIRouter, Request
@@ -28,8 +27,8 @@ _UNKNOWN: dict[int | str, dict[str, Any]] = {
 async def get_settings(request: Request, id: str) -> PersonSettings:
     """Each choice, or null where none was made; the shared gallery is nobody's and has none."""
     hub = hub_of(request)
-    await asyncio.to_thread(hub.store.galleries.get, id)
-    return await asyncio.to_thread(hub.diary.settings.get, id)
+    await hub.database(hub.store.galleries.get, id)
+    return await hub.database(hub.diary.settings.get, id)
 
 
 @router.patch(
@@ -50,17 +49,17 @@ async def change_settings(request: Request, id: str) -> PersonSettings:
     changes = await read_object(request, tuple(PersonSettings.model_fields))
     if id == SHARED:
         raise SharedGallery("the shared gallery is nobody's: choices are kept for one person")
-    await asyncio.to_thread(hub.store.galleries.get, id)
+    await hub.database(hub.store.galleries.get, id)
     settings = hub.diary.settings
     try:
-        changed = await asyncio.to_thread(settings.change, id, changes, wall_ms())
+        changed = await hub.database(settings.change, id, changes, wall_ms())
     except ValidationError as error:
         message, fields = describe_validation(error)
         raise Invalid(message[:300], fields=fields) from None
     try:
-        await asyncio.to_thread(hub.store.galleries.get, id)
+        await hub.database(hub.store.galleries.get, id)
     except NotFound:
         # It was deleted meanwhile: nobody would ever forget these.
-        await asyncio.to_thread(settings.forget, id)
+        await hub.database(settings.forget, id)
         raise
     return changed

@@ -1,6 +1,5 @@
 """REST: the timeline of what happened."""
 
-import asyncio
 import json
 from collections.abc import Collection, Iterator
 from datetime import UTC, datetime
@@ -58,9 +57,10 @@ async def list_events(
     limit: Annotated[int, Query(ge=1, le=MOST)] = 50,
 ) -> dict[str, Any]:
     """A page of events. ``before`` in the answer asks for the next one; null at the end."""
-    diary = hub_of(request).diary
+    hub = hub_of(request)
+    diary = hub.diary
     kinds = seen_by(request, kind)
-    page = await asyncio.to_thread(diary.events.page, limit, before=before, kinds=kinds)
+    page = await hub.database(diary.events.page, limit, before=before, kinds=kinds)
     return {
         "events": [event_json(event) for event in page],
         "before": page[-1].id if len(page) == limit else None,
@@ -101,8 +101,9 @@ def _lines(events: EventStore, kinds: list[Kind]) -> Iterator[str]:
 )
 async def picture(request: Request, id: Id) -> Response:
     """A small picture of the robot."""
-    events = hub_of(request).diary.events
-    jpeg = await asyncio.to_thread(events.blob, id, "picture", seen_by(request))
+    hub = hub_of(request)
+    events = hub.diary.events
+    jpeg = await hub.database(events.blob, id, "picture", seen_by(request))
     return Response(jpeg, media_type="image/jpeg", headers=UNCHANGING)
 
 
@@ -118,6 +119,7 @@ async def picture(request: Request, id: Id) -> Response:
 )
 async def template(request: Request, id: Id) -> Response:
     """The template that was seen, or taught."""
-    events = hub_of(request).diary.events
-    bits = await asyncio.to_thread(events.blob, id, "template", seen_by(request))
+    hub = hub_of(request)
+    events = hub.diary.events
+    bits = await hub.database(events.blob, id, "template", seen_by(request))
     return Response(template_png(bits), media_type="image/png", headers=UNCHANGING)

@@ -179,24 +179,13 @@ class RobotPort:
     def wait_newer(self, timeout_s: float, so: Callable[[State], bool] = lambda _: True) -> bool:
         """Wait for a state that comes after this call and is so; False when none does."""
         since = time.monotonic()
-
-        def has_come() -> bool:
-            return self._state is not None and (self._state_at or 0.0) > since and so(self._state)
-
         with self._changed:
-            return self._changed.wait_for(has_come, timeout_s)
+            return self._changed.wait_for(lambda: self.has_newer(since, so), timeout_s)
 
-    def wait_reset(self, timeout_s: float) -> bool:
-        """Wait until the robot shows a reset that it granted, and the disk knows it in both places.
-
-        Returns:
-            False when that takes longer; :attr:`state` and :attr:`stop_memory` tell what lacks.
-        """
-        ends = time.monotonic() + timeout_s
-        shown = self.wait_newer(
-            timeout_s, lambda state: state.mode != "stopped" and state.latch.status == "none"
-        )
-        return self.stop_memory.wait(max(0.0, ends - time.monotonic())) and shown
+    def has_newer(self, since: float, so: Callable[[State], bool] = lambda _: True) -> bool:
+        """Whether a state came after ``since`` (s, monotonic) and is so."""
+        state, at = self._state, self._state_at
+        return state is not None and (at or 0.0) > since and so(state)
 
     # Asking
 
@@ -206,6 +195,13 @@ class RobotPort:
         if link is not None:
             with contextlib.suppress(RobotUnavailable):
                 link.send(command)
+
+    def send_stop(self, request: StopRequest) -> None:
+        """Tell the robot to stop, and do not wait; :meth:`stop` makes sure that it did."""
+        link = self._link
+        if link is not None:
+            with contextlib.suppress(RobotUnavailable):
+                link.stop(request)
 
     def stop(self, request: StopRequest, timeout_s: float) -> None:
         """Stop the robot, and wait until it says that it has understood.
@@ -225,10 +221,7 @@ class RobotPort:
             return counted or state.mode == "stopped"
 
         while True:
-            link = self._link
-            if link is not None:
-                with contextlib.suppress(RobotUnavailable):
-                    link.stop(request)
+            self.send_stop(request)
             if not told:  # after it was sent, because a log may make us wait
                 told = True
                 self.stop_memory.asked(request)

@@ -1,15 +1,18 @@
 """One operator session: what a browser sends, and what becomes of it."""
 
 import asyncio
+import contextlib
 import logging
 import secrets
 import time
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from app.errors import FarhandError, NotAllowed, RequestError
 from app.gateway.bad_messages import BadMessages
+from app.gateway.busy import Busy
 from app.gateway.closing import CLOSE_INTERNAL, CLOSE_TOO_BIG, CLOSE_TOO_SLOW, Closing
 from app.gateway.drive import Situation
 from app.gateway.errors import INTERNAL_MESSAGE
@@ -41,6 +44,7 @@ from app.gateway.pace import Pace
 from app.gateway.roles import OPERATORS_ONLY, Role, may_send
 from app.gateway.session_keys import SessionKeys
 from app.gateway.stops import Stops
+from app.link.messages import StopRequest
 
 if TYPE_CHECKING:
     from app.gateway.hub import Hub
@@ -53,13 +57,6 @@ MAX_MESSAGES_HZ = 200.0
 """A client that sends more in the long run is read no faster, so that a flood from one does not
 take the time of all; a page sends less than half of it."""
 MESSAGE_BURST = 100
-
-
-class Busy(RequestError):
-    """Too much was asked at once."""
-
-    default_code = "busy"
-    status = 429
 
 
 class OperatorSession:
@@ -85,7 +82,7 @@ class OperatorSession:
             self.tell,
         )
         self._counted = BadMessages(hub.settings.gateway.max_bad_messages, metrics, self.tell)
-        self._gallery = GalleryChoice(hub.gallery)
+        self._gallery = GalleryChoice(hub.gallery, hub.learners)
         self._heard_at = time.monotonic()
         self._leases = LeaseKeeper(self.name, hub.robot, hub.ask, self._silent_s, self.tell)
         self._pictures = PictureAge(hub.settings.gateway.picture_age_ms)
@@ -102,18 +99,30 @@ class OperatorSession:
         self._slot = FrameSlot(
             role, hub.settings, metrics, lambda: self._gallery.enrolled, self._situation_of_frame
         )
+        # A thread of its own, begun by the first frame: whatever others do, and however many of
+        # them there are, the system gives each session's frames their turn.
+        self._frame_thread = ThreadPoolExecutor(1, f"frames-{self.name}")
+        worker = FrameWorker(
+            self.name,
+            hub.settings,
+            hub.gallery.current,
+            hub.robot,
+            hub.holds,
+            sequence,
+            self._stop_shown,
+        )
         self._work = FrameWork(
             self._slot,
-            FrameWorker(
-                self.name, hub.settings, hub.gallery.current, hub.robot, hub.holds, sequence
-            ),
-            hub.images,
+            worker,
+            self._frame_thread,
             self.outbox,
             self._counted,
             metrics,
-            self._stops.begin,
             self._diary,
         )
+        self._loop = asyncio.get_running_loop()
+        self._choosing: asyncio.Future[None] = self._loop.create_future()
+        self._choosing.set_result(None)
         self._requests: asyncio.Queue[ClientMessage] = asyncio.Queue(MAX_REQUESTS)
         self._arrivals = 0
         self._opened_tick = tick_ms()
@@ -136,9 +145,10 @@ class OperatorSession:
             await self._end(done.pop())
         finally:
             self._hub.people.discard(self)
-            for task in tasks:
+            for task in (*tasks, self._choosing):
                 task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
+            await asyncio.gather(*tasks, self._choosing, return_exceptions=True)
+            self._frame_thread.shutdown(wait=False)
             self._gallery.close()
             self._diary.close()
             await asyncio.shield(self._leases.close())
@@ -215,6 +225,13 @@ class OperatorSession:
                 seq = error.detail.get("seq") if data is not None else None
                 self._counted.bad(error, seq, self._arrivals)
 
+    def _stop_shown(self, request: StopRequest) -> None:
+        """A frame says stop. Called on the frame's thread."""
+        # Sent from here, whatever the event loop is busy with; then made sure of, and told.
+        self._hub.robot.send_stop(request)
+        with contextlib.suppress(RuntimeError):  # the server has ended
+            self._loop.call_soon_threadsafe(self._stops.begin, request.reason, "gesture")
+
     def _silent_s(self) -> float:
         return time.monotonic() - self._heard_at
 
@@ -256,7 +273,11 @@ class OperatorSession:
                 self._keys.take(message, self._situation_of_key)
             case Picture():
                 self._pictures.saw(message.camera, message.tick)
-            case TakeControl() | HandOver() | UseGallery():
+            case UseGallery():
+                # Learning it may take long, and must not hold up who disarms or gives control back.
+                self._choosing.cancel()
+                self._choosing = asyncio.create_task(self._choose(message.gallery))
+            case TakeControl() | HandOver():
                 self._queue(message)
             case _ if message.type == "stop":
                 self._stops.begin("stop was pressed", "button")
@@ -286,10 +307,6 @@ class OperatorSession:
         if isinstance(message, HandOver):
             await self._hub.people.hand_over(self, message.to)
             return
-        if isinstance(message, UseGallery):
-            await self._gallery.choose(message.gallery)
-            self.tell_gallery()
-            return
         match message.type:
             case "release_control":
                 await self.give_up()
@@ -298,12 +315,21 @@ class OperatorSession:
             case "keep_control":
                 self._hub.people.keep(self)
             case "arm":
+                if not self._choosing.done():
+                    raise Busy("the gallery that you chose is still being learned; arm again then")
                 self._hub.check_gestures()
                 await self._leases.arm(armed=True)
             case "disarm":
                 await self._leases.arm(armed=False)
             case "reset":
                 await self._hub.reset(self.name)
+
+    async def _choose(self, gallery: str) -> None:
+        try:
+            await self._gallery.choose(gallery)
+            self.tell_gallery()
+        except FarhandError as error:
+            self.tell(error)
 
     async def take(self, *, takeover: bool = False) -> None:
         """Become the one who drives; raises what :meth:`LeaseKeeper.take` does."""

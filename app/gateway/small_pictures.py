@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+from concurrent.futures import ThreadPoolExecutor
 
 import cv2
 import simplejpeg
@@ -15,12 +16,13 @@ log = logging.getLogger(__name__)
 class SmallPictures:
     """One camera's newest picture at each level. Used on the event loop only.
 
-    A level is made when the first viewer asks for it, in a thread; all who ask meanwhile and
-    afterwards get the same bytes. So there are at most as many encodings a second as the camera has
-    pictures, times the levels in use.
+    A level is made when the first viewer asks for it, in the camera's own thread; all who ask
+    meanwhile and afterwards get the same bytes. So there are at most as many encodings a second as
+    the camera has pictures, times the levels in use.
     """
 
     def __init__(self) -> None:
+        self._thread = ThreadPoolExecutor(1, "small-picture")
         self._made: dict[int, tuple[bytes, asyncio.Future[bytes]]] = {}
 
     async def __call__(self, picture: bytes, level: int) -> bytes:
@@ -30,7 +32,8 @@ class SmallPictures:
             return picture
         source, made = self._made.get(level, (b"", None))
         if made is None or source is not picture:
-            made = asyncio.ensure_future(asyncio.to_thread(smaller, picture, wanted))
+            loop = asyncio.get_running_loop()
+            made = loop.run_in_executor(self._thread, smaller, picture, wanted)
             self._made[level] = (picture, made)
         return await asyncio.shield(made)
 

@@ -14,9 +14,8 @@ are those of :mod:`app.link.actions`. ``active = false`` marks a gesture that is
 matched. Nothing else is allowed: what is misspelt is refused, not ignored.
 """
 
-import io
 import json
-import lzma
+import struct
 import tomllib
 import zipfile
 import zlib
@@ -28,21 +27,22 @@ from typing import Any
 from pydantic import ValidationError
 
 from app.errors import Invalid
+from app.gestures.archive import ZIP_MAX_BYTES, Archive
 from app.gestures.png import PNG_MAX_BYTES, read_template
 from app.gestures.records import (
     MAX_GESTURES,
+    MAX_SAMPLES,
     NewGesture,
     check_templates,
     clean_name,
     name_key,
 )
+from app.gestures.toml_limits import check_simple
 from app.link.actions import ACTION, Action
 
 FORMAT = 1
 INDEX = "gestures.toml"
 INDEX_MAX_BYTES = 1 << 20
-ZIP_MAX_BYTES = 64 << 20
-"""Of a zip file, and of everything that is unpacked from it."""
 
 Read = Callable[[str, int], bytes]
 """Gives the bytes of a file in the set by its path; refuses more than the given number."""
@@ -63,8 +63,7 @@ def read_set(source: Path) -> list[NewGesture]:
             return _parse(_folder_reader(source))
         if source.stat().st_size > ZIP_MAX_BYTES:
             raise Invalid(f"{source} is larger than {ZIP_MAX_BYTES >> 20} MiB")
-        with zipfile.ZipFile(source) as archive:
-            return _parse(_zip_reader(archive))
+        return _parse(_zip_reader(Archive(source.read_bytes())))
 
 
 def read_zip(data: bytes, progress: Progress | None = None) -> list[NewGesture]:
@@ -77,15 +76,15 @@ def read_zip(data: bytes, progress: Progress | None = None) -> list[NewGesture]:
     Raises:
         Invalid: damaged, or not exactly in the format; says where and why.
     """
-    with _plain_errors("the file"), zipfile.ZipFile(io.BytesIO(data)) as archive:
-        return _parse(_zip_reader(archive), progress)
+    with _plain_errors("the file"):
+        return _parse(_zip_reader(Archive(data)), progress)
 
 
 @contextmanager
 def _plain_errors(source: object) -> Iterator[None]:
     try:
         yield
-    except (zipfile.BadZipFile, zlib.error, lzma.LZMAError, NotImplementedError) as error:
+    except (zipfile.BadZipFile, zlib.error, NotImplementedError, struct.error) as error:
         raise _unreadable(source, error) from error
     except (OSError, EOFError, RuntimeError, ValueError) as error:
         # What zipfile raises for passwords, impossible offsets and names in no encoding, and the
@@ -100,7 +99,11 @@ def _unreadable(source: object, error: Exception) -> Invalid:
 
 def _parse(read: Read, progress: Progress | None = None) -> list[NewGesture]:
     try:
-        index = tomllib.loads(read(INDEX, INDEX_MAX_BYTES).decode())
+        text = read(INDEX, INDEX_MAX_BYTES).decode()
+        check_simple(text)
+        index = tomllib.loads(text)
+    except Invalid as error:
+        raise Invalid(f"{INDEX} {error.message}".replace(f"{INDEX} {INDEX}", INDEX)) from error
     except (ValueError, RecursionError) as error:
         raise Invalid(f"{INDEX} is not TOML in UTF-8: {error}") from error
     if index.get("format") != FORMAT or isinstance(index["format"], bool):
@@ -143,6 +146,8 @@ def _gesture(read: Read, table: dict[str, Any], where: str) -> NewGesture:
         raise Invalid(f"{where}: active is true or false, not {active!r}")
     if not isinstance(samples, list) or not all(isinstance(path, str) for path in samples):
         raise Invalid(f"{where}: samples is missing, or is not a list of paths")
+    if len(samples) > MAX_SAMPLES:
+        raise Invalid(f"{where}: {len(samples)} samples given; a gesture may have {MAX_SAMPLES}")
     action = _action(table.get("action"), where)
     templates = []
     for path in samples:
@@ -204,25 +209,16 @@ def _folder_reader(folder: Path) -> Read:
     return read
 
 
-def _zip_reader(archive: zipfile.ZipFile) -> Read:
+def _zip_reader(archive: Archive) -> Read:
     # The set may lie in one folder inside the zip, as file managers pack it.
-    tops = [name for name in archive.namelist() if PurePosixPath(name).name == INDEX]
+    tops = [name for name in archive.names if PurePosixPath(name).name == INDEX]
     prefix = min(tops, key=len)[: -len(INDEX)] if tops else ""
-    total = 0
 
     def read(path: str, limit: int) -> bytes:
-        nonlocal total
         try:
-            info = archive.getinfo(prefix + path)
+            return archive.read(prefix + path, limit)
         except KeyError:
             raise Invalid(_missing(path, "the zip file")) from None
-        # Bounded by what really comes out, whatever the entry says of itself.
-        with archive.open(info) as stream:
-            data = _limited(stream.read(limit + 1), limit)
-        total += len(data)
-        if total > ZIP_MAX_BYTES:
-            raise Invalid(f"makes the set larger than {ZIP_MAX_BYTES >> 20} MiB")
-        return data
 
     return read
 

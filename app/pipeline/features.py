@@ -33,9 +33,14 @@ class Features:
     """
 
     def __init__(self, settings: MatchSettings) -> None:
+        self._settings = settings
         self._binary = settings.features == "binary"
         self._shape = load(SHAPE_MODEL) if settings.features == "shape" else None
         self._weight = settings.shape_weight
+
+    def __reduce__(self) -> tuple[type["Features"], tuple[MatchSettings]]:
+        """To another process without the network, which each process loads for itself."""
+        return Features, (self._settings,)
 
     def __call__(self, views: U8) -> F32:
         """Returns (v, d), a new array; d is h*w, and 48 more with ``shape``."""

@@ -120,7 +120,7 @@ def _png(data: bytes) -> ImageInfo:
 def _webp(data: bytes) -> ImageInfo:
     if 8 + int(struct.unpack_from("<I", data, 4)[0]) > len(data) + 1:
         raise cut_short()
-    width = height = 0
+    sizes: list[tuple[int, ...]] = []
     orientation, at = 1, 12
     while at + 8 <= len(data):
         kind, length = struct.unpack_from("<4sI", data, at)
@@ -130,16 +130,19 @@ def _webp(data: bytes) -> ImageInfo:
         if kind == b"VP8X":
             if body[0] & 0x02:
                 raise ImageRefused("an animated WebP: a single picture is needed")
-            width = 1 + int.from_bytes(body[4:7], "little")
-            height = 1 + int.from_bytes(body[7:10], "little")
+            sizes.append(
+                (1 + int.from_bytes(body[4:7], "little"), 1 + int.from_bytes(body[7:10], "little"))
+            )
         elif kind == b"VP8 ":
-            width, height = (side & 0x3FFF for side in struct.unpack_from("<HH", body, 6))
+            sizes.append(tuple(side & 0x3FFF for side in struct.unpack_from("<HH", body, 6)))
         elif kind == b"VP8L":
             bits = struct.unpack_from("<I", body, 1)[0]
-            width, height = 1 + (bits & 0x3FFF), 1 + (bits >> 14 & 0x3FFF)
+            sizes.append((1 + (bits & 0x3FFF), 1 + (bits >> 14 & 0x3FFF)))
         elif kind == b"EXIF":
             orientation = _exif_orientation(body.removeprefix(b"Exif\0\0"))
         at += 8 + length + (length & 1)
+    # Which of several pictures a decoder takes is its own affair: the largest counts.
+    width, height = (max(sides) for sides in zip(*sizes, strict=True)) if sizes else (0, 0)
     if width == 0 or height == 0:
         raise cut_short()
     return ImageInfo("webp", width, height, orientation)

@@ -5,7 +5,7 @@ a gesture, or refused. Samples of one burst resemble each other more than what w
 so the counts flatter; which two gestures are near one another they tell all the same.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -100,6 +100,27 @@ def answer(matcher: PcaMatcher, index: int) -> Answer:
     if match.cause == "low_margin":
         torn = look.second if match.gesture == label else match.gesture
     return Answer(label, match.gesture if match.accepted else None, torn, distances[label], others)
+
+
+def try_all(
+    matcher: PcaMatcher,
+    labels: Sequence[str],
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> MixUps:
+    """Show all that is to be shown, and count the answers.
+
+    Args:
+        matcher: Of the gallery.
+        labels: All gestures that are matched, in the order of the table.
+        progress: Told how many samples were shown, of how many; what it raises ends the work.
+    """
+    asked = asked_of(matcher)
+    answers = []
+    for done, index in enumerate(asked):
+        progress(done, len(asked))
+        answers.append(answer(matcher, index))
+    progress(len(asked), len(asked))
+    return tally(labels, answers)
 
 
 def tally(labels: Sequence[str], answers: Sequence[Answer]) -> MixUps:

@@ -56,7 +56,8 @@ def wait_for(condition: Callable[[], Any], what: str = "", timeout_s: float = WA
 def settings_for(folder: Path, endpoint: str | None = None, **gateway: Any) -> Settings:
     """Settings of a server on a free port; with an endpoint, its node runs elsewhere."""
     robot = RobotSettings() if endpoint is None else RobotSettings(spawn=False, endpoint=endpoint)
-    gateway = {"viser": False, **gateway}
+    # On a machine full of other tests, what stands back behind everything would never be done.
+    gateway = {"viser": False, "work_niceness": 0, **gateway}
     return Settings(
         port=0,
         data_dir=folder / "data",

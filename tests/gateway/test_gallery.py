@@ -10,6 +10,7 @@ from app.config import PipelineSettings
 from app.errors import DatabaseBroken, NotFound
 from app.gateway.gallery import DATABASE_FILE, SPARE, LiveGallery
 from app.gateway.gallery_choice import GalleryChoice
+from app.gateway.learning import fit
 from app.gestures import GestureStore
 from app.gestures.importing import import_entries, plan_of
 from app.gestures.records import SHARED, NewGesture
@@ -62,7 +63,7 @@ def test_what_was_prepared_is_not_learned_again(
     ]
     pairs = plan_of(there, entries, "replace").after(there)
     told: list[tuple[int, int]] = []
-    live.prepare(pairs, lambda done, total: told.append((done, total)))
+    live.prepared(pairs, fit(pairs, SETTINGS, lambda done, total: told.append((done, total))))
     assert told == [(done, len(pairs)) for done in range(len(pairs))]
 
     def again(*_: object) -> None:
@@ -104,6 +105,16 @@ def test_only_what_changed_is_fitted_anew(store: GestureStore, live: LiveGallery
     assert live.known(bob) is not before[2]
 
 
+def test_what_a_gesture_does_is_changed_without_learning_anew(
+    store: GestureStore, live: LiveGallery
+) -> None:
+    before = live.current
+    store.update(store.list()[0].id, action=Stop())
+    assert live.refresh()
+    assert live.current.actions != before.actions
+    assert live.current.matcher is before.matcher
+
+
 def test_what_nobody_uses_any_more_is_forgotten(store: GestureStore, live: LiveGallery) -> None:
     ids = [store.galleries.create(str(number)).id for number in range(SPARE + 2)]
     live.refresh()
@@ -137,7 +148,7 @@ async def test_a_choice_falls_back_when_its_gallery_is_deleted(
     store: GestureStore, live: LiveGallery
 ) -> None:
     ann = store.galleries.create("Ann").id
-    choice, other = GalleryChoice(live), GalleryChoice(live)
+    choice, other = GalleryChoice(live, asyncio.to_thread), GalleryChoice(live, asyncio.to_thread)
     assert (choice.id, choice.enrolled) == (SHARED, live.current)
     await choice.choose(ann)
     assert (choice.id, choice.enrolled) == (ann, live.known(ann))
@@ -163,7 +174,7 @@ async def test_a_choice_that_is_given_up_holds_no_gallery(
     store: GestureStore, live: LiveGallery, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ann = store.galleries.create("Ann").id
-    choice = GalleryChoice(live)
+    choice = GalleryChoice(live, asyncio.to_thread)
     task = asyncio.create_task(choice.choose(ann))
     await asyncio.sleep(0)
     task.cancel()

@@ -1,7 +1,6 @@
 """What the gesture manager does, over REST: samples, undo, mix-ups, a gallery as a file."""
 
 import io
-import threading
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -17,6 +16,7 @@ from app.gestures import NewGesture
 from app.gestures.exchange import entries_of
 from app.gestures.setwriter import zip_stream
 from app.link.actions import Home
+from tests.gateway import held
 from tests.gateway.running import Running, wait_for
 from tests.gateway.test_rest_gestures import JOG, enrol, error
 from tests.gestures.conftest import template
@@ -181,16 +181,12 @@ def test_two_alike_are_told_by_their_own_samples(server: Running) -> None:
 
 
 def test_a_job_is_cancelled_and_too_many_are_refused(
-    server: Running, monkeypatch: pytest.MonkeyPatch
+    server: Running, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    hold = threading.Event()
-    real = rest_matrix._answers
-
-    def slow(*arguments: Any) -> Any:
-        hold.wait(30)
-        return real(*arguments)
-
-    monkeypatch.setattr(rest_matrix, "_answers", slow)
+    hold = tmp_path / "hold"
+    hold.touch()
+    monkeypatch.setenv("HELD_WHILE", str(hold))
+    monkeypatch.setattr(rest_matrix, "try_all", held.try_all)
     start = lambda: server.http.post("/api/galleries/shared/matrix")  # noqa: E731
     try:
         first, second = start(), start()
@@ -201,13 +197,17 @@ def test_a_job_is_cancelled_and_too_many_are_refused(
         path = f"/api/jobs/{first.json()['id']}"
         wait_for(lambda: server.http.get(path).json()["total"], "the job to begin")
         assert server.http.delete(path).json()["state"] == "running"
+        # It ends at once, although it says nothing, and its place is free.
+        told = ended(server, first)
+        assert (told["state"], told["kind"], told["result"]) == ("cancelled", "matrix", None)
+        third = start()
+        assert third.status_code == 202
         # Driving and everything else go on meanwhile.
         assert server.http.get("/api/health").status_code == 200
     finally:
-        hold.set()
-    told = ended(server, first)
-    assert (told["state"], told["kind"], told["result"]) == ("cancelled", "matrix", None)
+        hold.unlink()
     assert ended(server, second)["state"] == "done"
+    assert ended(server, third)["state"] == "done"
     error(server.http.get("/api/jobs/nobody"), 404, "not_found")
     error(server.http.delete("/api/jobs/nobody"), 404, "not_found")
 

@@ -175,6 +175,16 @@ def test_scan_bomb_is_refused_before_decoding():
         extract_template(bomb, SETTINGS)
 
 
+def test_of_several_pictures_in_a_webp_the_largest_counts():
+    small = saved(RGB.resize((48, 40)), "WEBP", lossless=True)
+    header = b"\x2f" + struct.pack("<I", 16383 | 16383 << 14)
+    huge = b"VP8L" + struct.pack("<I", len(header) + 1) + header + b"\0"
+    body = b"WEBP" + huge + small[12:]
+    data = b"RIFF" + struct.pack("<I", len(body)) + body
+    with pytest.raises(ImageRefused, match=r"16384x16384: at most 25 million pixels"):
+        extract_template(data, SETTINGS)
+
+
 TINY = [saved(RGB.resize((48, 40)), kind) for kind in ("JPEG", "PNG", "WEBP")]
 
 

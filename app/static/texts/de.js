@@ -928,6 +928,8 @@ export const texts = Object.freeze({
             no_dry_run: "Ein Roboter, der fährt, lässt sich nicht vorab prüfen.",
             unknown_pose: "Diese Stellung kennt der Roboter nicht.",
             image_refused: "Auf dem Bild ist keine brauchbare Hand.",
+            too_much_work: "Das braucht mehr Zeit oder Speicher, als es darf. Nichts wurde geändert.",
+            body_too_slow: "Das Gesendete kam nicht rechtzeitig an. Nichts wurde geändert.",
             busy: "Gerade ist zu viel zu tun. Versuchen Sie es gleich noch einmal.",
             internal: "Im Server ging etwas schief; sein Protokoll sagt, was.",
             robot_unavailable: "Der Roboter antwortet nicht.",

@@ -925,6 +925,8 @@ export const texts = Object.freeze({
             no_dry_run: "A robot that drives cannot be checked beforehand.",
             unknown_pose: "The robot has no such pose.",
             image_refused: "The picture has no usable hand in it.",
+            too_much_work: "That takes more time or memory to work on than it may. Nothing was changed.",
+            body_too_slow: "What was sent took too long to arrive. Nothing was changed.",
             busy: "There is too much to do right now. Try again in a moment.",
             internal: "Something went wrong inside the server; its log says what.",
             robot_unavailable: "The robot does not answer.",
