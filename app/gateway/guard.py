@@ -13,6 +13,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from app.errors import NotAllowed, NotFound, NotSignedIn, RequestError
 from app.gateway.auth import Gatekeeper, Identity
 from app.gateway.errors import error_body, error_response, unexpected_response
+from app.gateway.http_limits import is_answered, too_many_requests
 from app.gateway.pages import again_page, sign_in_page
 from app.gateway.roles import WEBSOCKET, find
 from app.gateway.throttle import TooManyGuesses
@@ -84,6 +85,10 @@ class Guard:
 
         try:
             refusal, identity = self._judge(scope, method, path)
+            known = identity is not None or scope.get("farhand.known", False)
+            if not is_answered(scope, known):
+                busy = too_many_requests()
+                refusal = error_response(busy, {"Retry-After": "1", "Connection": "close"})
             scope["farhand.identity"] = identity
             if refusal is None:
                 try:
@@ -151,6 +156,10 @@ class Guard:
         except TooManyGuesses as error:
             return too_many_response(error), None
         except (NotAllowed, RequestError) as error:
+            # Who may not do this has shown who they are, unless nobody looked.
+            scope["farhand.known"] = (
+                isinstance(error, NotAllowed) and error.code != "not_through_proxy"
+            )
             return error_response(error), None
         return (None if found.access else _not_there(method, path, found.methods)), identity
 

@@ -14,7 +14,7 @@ import httpx
 import uvloop
 from websockets.sync.client import ClientConnection, connect
 
-from app.config import GatewaySettings, RobotSettings, Settings
+from app.config import ConnectionSettings, GatewaySettings, RobotSettings, Settings
 from app.gateway.app import create_app
 from app.gateway.hub import Hub
 from app.gateway.serve import bind, make_server
@@ -53,6 +53,10 @@ def wait_for(condition: Callable[[], Any], what: str = "", timeout_s: float = WA
         time.sleep(0.005)
 
 
+MANY = ConnectionSettings(requests_per_s=10_000, all_requests_per_s=10_000)
+"""Tests ask more in a second, without being signed in, than people do."""
+
+
 def settings_for(folder: Path, endpoint: str | None = None, **gateway: Any) -> Settings:
     """Settings of a server on a free port; with an endpoint, its node runs elsewhere."""
     robot = RobotSettings() if endpoint is None else RobotSettings(spawn=False, endpoint=endpoint)
@@ -63,6 +67,7 @@ def settings_for(folder: Path, endpoint: str | None = None, **gateway: Any) -> S
         token=TOKEN,
         robot=robot,
         gateway=GatewaySettings(**gateway),
+        connections=MANY,
     )
 
 
