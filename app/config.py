@@ -638,18 +638,19 @@ class ConnectionSettings(_Section):
     all_requests_per_s: float = Field(
         default=100.0, gt=0.0, le=10_000.0, description="the same from all addresses together"
     )
-    handshakes_per_s: float = Field(
+    begins_per_s: float = Field(
         default=50.0,
-        gt=0.0,
+        ge=1.0,
         le=10_000.0,
-        description="TLS handshakes a second, in the long run, of those who are not signed in; "
-        "others wait. Those of addresses from which somebody is signed in are counted apart",
+        description="connections a second, in the long run, that may begin (a TLS handshake, a "
+        "first request) without being signed in; others wait. Those of addresses from which "
+        "somebody is signed in are counted apart",
     )
     burst_s: float = Field(
         default=5.0,
         ge=1.0,
         le=60.0,
-        description="so many seconds' worth of requests and handshakes may come at once",
+        description="so many seconds' worth of requests may come at once",
     )
 
 

@@ -32,7 +32,8 @@ class Connection:
     """
 
     __slots__ = (
-        "address", "deadline", "end", "expire", "is_closing", "signed_in", "spoke", "write_deadline"
+        "address", "deadline", "end", "expire", "is_closing", "pay_back", "signed_in", "spoke",
+        "write_deadline",
     )  # fmt: skip
 
     def __init__(self, address: str, deadline: float) -> None:
@@ -50,6 +51,8 @@ class Connection:
         """Called when :attr:`deadline` has passed."""
         self.is_closing: Callable[[], bool] = bool
         """Whether it is closed as soon as what was sent has been read."""
+        self.pay_back: Callable[[], None] = _nothing
+        """Called when it turns out to be of somebody signed in."""
 
 
 def _nothing() -> None:
@@ -174,6 +177,7 @@ class ConnectionTable:
         if connection in self._all and signed_in != connection.signed_in:
             if signed_in:
                 self._let_go(connection)
+                connection.pay_back()
             connection.signed_in = signed_in
             if not signed_in:
                 self._hold(connection)

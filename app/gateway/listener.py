@@ -14,8 +14,8 @@ from collections.abc import Callable
 from typing import Any
 
 from app.config import ConnectionSettings
+from app.gateway.begin_pace import BeginPace
 from app.gateway.connection_table import CLOSE_S, PROXY, Connection, ConnectionTable
-from app.gateway.handshake_pace import HandshakePace
 from app.gateway.machine import address_group
 from app.gateway.plain_http import send_away
 
@@ -27,6 +27,9 @@ BATCH = 16
 """Connections accepted at once, before the event loop does something else."""
 TROUBLE_S = 0.1
 """Pause where the system lets nothing be accepted."""
+KNOWN_RATE = 4.0
+"""So many times as fast begin connections of addresses from which somebody is signed in: who is
+there already should not wait long behind others of their network."""
 CHECKS = 20
 """The shortest of the times is kept to a part in this."""
 GONE = (errno.ECONNABORTED, errno.EPROTO, errno.ENOTCONN, errno.ECONNRESET)
@@ -62,9 +65,9 @@ class Listener:
         self._context = context
         self._is_proxy = is_proxy
         self._loop = asyncio.get_running_loop()
-        rate = settings.handshakes_per_s
-        self._known = HandshakePace(rate, rate * settings.burst_s)
-        self._others = HandshakePace(rate, rate * settings.burst_s)
+        rate = settings.begins_per_s
+        self._others = BeginPace(rate, rate)
+        self._known = BeginPace(KNOWN_RATE * rate, KNOWN_RATE * rate)
         self._quiet: dict[Connection, socket.socket] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         self._again: asyncio.TimerHandle | None = None
@@ -158,17 +161,16 @@ class Listener:
             return
         self._table.heard(connection)
         self._loop.remove_reader(accepted)
-        if self._context is None:
-            self._hand_on(connection)
-        elif first[0] == HANDSHAKE:
-            pace = self._known if self._table.is_known(connection.address) else self._others
-            pace.begin(
-                connection.address,
-                lambda: connection in self._quiet,
-                functools.partial(self._hand_on, connection, ssl=self._context),
-            )
+        if self._context is not None and first[0] != HANDSHAKE:
+            go = functools.partial(self._answer_plain, connection)
         else:
-            self._run(self._send_away(connection), connection)
+            go = functools.partial(self._hand_on, connection)
+        if connection.address == PROXY:
+            go()  # many are behind it, and it has limits of its own
+            return
+        pace = self._known if self._table.is_known(connection.address) else self._others
+        connection.pay_back = pace.put_back
+        pace.begin(connection.address, lambda: connection in self._quiet, go)
 
     def _run(self, work: Any, connection: Connection) -> None:
         task = asyncio.create_task(work)
@@ -180,17 +182,22 @@ class Listener:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    def _hand_on(self, connection: Connection, **tls: Any) -> None:
+    def _hand_on(self, connection: Connection) -> None:
         accepted = self._quiet.pop(connection)
-        self._run(self._connect(connection, accepted, tls), connection)
+        self._run(self._connect(connection, accepted), connection)
 
-    async def _connect(
-        self, connection: Connection, accepted: socket.socket, tls: dict[str, Any]
-    ) -> None:
+    def _answer_plain(self, connection: Connection) -> None:
+        self._run(self._send_away(connection), connection)
+
+    async def _connect(self, connection: Connection, accepted: socket.socket) -> None:
         """Make it a connection of uvicorn's, which closes it from then on."""
-        if tls:
-            tls["ssl_handshake_timeout"] = self._settings.begin_s
-            tls["ssl_shutdown_timeout"] = CLOSE_S
+        tls: dict[str, Any] = {}
+        if self._context is not None:
+            tls = {
+                "ssl": self._context,
+                "ssl_handshake_timeout": self._settings.begin_s,
+                "ssl_shutdown_timeout": CLOSE_S,
+            }
         try:
             await self._loop.connect_accepted_socket(
                 lambda: self._protocol(connection), accepted, **tls

@@ -53,7 +53,7 @@ def wait_for(condition: Callable[[], Any], what: str = "", timeout_s: float = WA
         time.sleep(0.005)
 
 
-MANY = ConnectionSettings(requests_per_s=10_000, all_requests_per_s=10_000)
+MANY = ConnectionSettings(requests_per_s=10_000, all_requests_per_s=10_000, begins_per_s=10_000)
 """Tests ask more in a second, without being signed in, than people do."""
 
 

@@ -154,8 +154,8 @@ async def test_one_more_than_there_may_be_closes_the_oldest(tmp_path: Path) -> N
             connection.close()
 
 
-async def test_handshakes_wait_their_turn_and_all_get_it(tmp_path: Path) -> None:
-    async with listening(tmp_path, handshakes_per_s=20, burst_s=1) as here:
+async def test_connections_begin_in_turn_and_all_get_theirs(tmp_path: Path) -> None:
+    async with listening(tmp_path, begins_per_s=20) as here:
         began = time.monotonic()
         answers = await asyncio.gather(*(here.echo(b"hello") for _ in range(30)))
         assert answers == [b"hello"] * 30

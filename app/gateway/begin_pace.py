@@ -1,4 +1,4 @@
-"""TLS handshakes in turn: each costs more than a request, and anybody may ask for one."""
+"""Connections begin in turn: a TLS handshake or a first request costs, and anybody may ask."""
 
 import asyncio
 import time
@@ -14,11 +14,11 @@ class _Waiting(NamedTuple):
     begin: Callable[[], None]
 
 
-class HandshakePace:
-    """Begins handshakes at a rate; addresses that wait get theirs by turns.
+class BeginPace:
+    """Begins connections at a rate; addresses that wait get theirs by turns.
 
     Args:
-        rate: Handshakes a second.
+        rate: Connections a second, in the long run.
         burst: That many at once.
     """
 
@@ -34,6 +34,10 @@ class HandshakePace:
             return
         self._waiting.setdefault(address, deque()).append(_Waiting(is_alive, begin))
         self._wait()
+
+    def put_back(self) -> None:
+        """One that has begun turned out to be of somebody signed in, who is not counted."""
+        self._bucket.put_back()
 
     def close(self) -> None:
         """Begin nothing more."""
