@@ -7,6 +7,7 @@ import time
 from http import HTTPStatus
 
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -93,6 +94,8 @@ class Guard:
             if refusal is None:
                 try:
                     await self._pass(scope, receive, send_on, identity)
+                except ClientDisconnect:
+                    log.debug("%s %s: the client is gone", method, path[:200])
                 except Exception:
                     log.exception("%s %s failed", method, path[:200])
                     if status == 0 and not websocket:

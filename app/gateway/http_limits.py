@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from http import HTTPStatus
-from typing import Any
+from typing import Any, NamedTuple
 
 from app.config import ConnectionSettings
 from app.errors import NotAllowed, RequestError
@@ -77,12 +77,26 @@ class HttpLimits:
         return address_group(str((scope.get("client") or ("",))[0]))
 
 
-def refusal(status: HTTPStatus, code: str, message: str) -> bytes:
-    """A whole HTTP answer to what cannot even be read, in the one shape of errors."""
-    body = json.dumps(error_body(code, message)).encode()
-    retry = b"Retry-After: 1\r\n" if status == HTTPStatus.TOO_MANY_REQUESTS else b""
-    return (
-        b"HTTP/1.1 %d %s\r\nContent-Type: application/json\r\nContent-Length: %d\r\n"
-        b"Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\n%sConnection: close\r\n\r\n"
-        % (status, status.phrase.encode(), len(body), retry)
-    ) + body
+class Refusal(NamedTuple):
+    """Why what cannot even be read as a request is refused."""
+
+    status: HTTPStatus
+    code: str
+    message: str
+
+    def answer(self) -> bytes:
+        """The whole HTTP answer, in the one shape of errors."""
+        body = json.dumps(error_body(self.code, self.message)).encode()
+        retry = b"Retry-After: 1\r\n" if self.status == HTTPStatus.TOO_MANY_REQUESTS else b""
+        return (
+            b"HTTP/1.1 %d %s\r\nContent-Type: application/json\r\nContent-Length: %d\r\n"
+            b"Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\n%s"
+            b"Connection: close\r\n\r\n"
+            % (self.status, self.status.phrase.encode(), len(body), retry)
+        ) + body
+
+
+def head_too_large(what: str, most: int, unit: str = "bytes") -> Refusal:
+    """For a head, or a part of one, over a limit."""
+    status = HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE
+    return Refusal(status, "head_too_large", f"{what} may have {most} {unit}")

@@ -8,13 +8,20 @@ import asyncio
 import functools
 import time
 from http import HTTPStatus
-from typing import Any, NamedTuple
+from typing import Any
 
 import httptools
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from app.gateway.connection_table import Connection
-from app.gateway.http_limits import JUDGED, HttpLimits, Judged, refusal, too_many_requests
+from app.gateway.http_limits import (
+    JUDGED,
+    HttpLimits,
+    Judged,
+    Refusal,
+    head_too_large,
+    too_many_requests,
+)
 from app.gateway.ws_protocol import LimitedWebSocket
 
 SLICE = 16 * 1024
@@ -28,12 +35,6 @@ MAX_LINGER = 1 << 20
 """So long, and so many bytes more, who was refused is read on: closing at once would reset the
 connection, and the answer that says why would be lost."""
 CREDENTIALS = (b"authorization", b"cookie")
-
-
-class _Refusal(NamedTuple):
-    status: HTTPStatus
-    code: str
-    message: str
 
 
 class _RefusedError(Exception):
@@ -55,7 +56,7 @@ class LimitedHttp(HttpToolsProtocol):
         self._limits = limits
         self._settings = limits.settings
         self.timeout_keep_alive = self._settings.keep_alive_s
-        self._refusal: _Refusal | None = None
+        self._refusal: Refusal | None = None
         self._head_bytes = 0
         self._header_count = 0
         self._in_head = False
@@ -118,16 +119,27 @@ class LimitedHttp(HttpToolsProtocol):
             if not self._in_body:
                 self._begin_head()
                 size = min(SLICE, self._settings.max_head_bytes - self._head_bytes)
-                self._head_bytes += size
-            else:
-                self._body_fed += size
             part = data[at : at + size]
-            at += len(part)
-            if not self._parsed(part):
+            at += size
+            if self._in_body:
+                self._body_fed += len(part)
+            else:
+                self._head_bytes += len(part)
+            if not self._parsed(part) or not self._is_within_limits():
                 return
-            if not self._in_body and self._head_bytes >= self._settings.max_head_bytes:
-                self._refuse(self._too_large("the head of a request", "max_head_bytes"))
-                return
+
+    def _is_within_limits(self) -> bool:
+        """Whether what has been parsed of a request may go on."""
+        if self._in_body:
+            wrapping = self._body_fed - self._body_bytes
+            if wrapping > self._settings.max_head_bytes + WRAPPING * self._body_bytes:
+                message = "there is far more round the body of this request than in it"
+                self._refuse(Refusal(HTTPStatus.BAD_REQUEST, "bad_request", message))
+                return False
+        elif self._head_bytes >= self._settings.max_head_bytes:
+            self._refuse(head_too_large("the head of a request", self._settings.max_head_bytes))
+            return False
+        return True
 
     def _parsed(self, data: bytes) -> bool:
         """Whether there is more to parse on this connection."""
@@ -143,7 +155,7 @@ class LimitedHttp(HttpToolsProtocol):
                 self._discarded = 0
             return False
         except httptools.HttpParserError:
-            bad = _Refusal(HTTPStatus.BAD_REQUEST, "bad_request", "this is not a request in HTTP")
+            bad = Refusal(HTTPStatus.BAD_REQUEST, "bad_request", "this is not a request in HTTP")
             self._refuse(self._refusal or bad)
             return False
         return not self.transport.is_closing()
@@ -161,21 +173,15 @@ class LimitedHttp(HttpToolsProtocol):
         self._begin_head()
         self._header_count = 0
         if len(self.pipeline) >= MAX_PIPELINED:
-            self._stop(
-                HTTPStatus.TOO_MANY_REQUESTS,
-                "too_many_requests",
-                f"at most {MAX_PIPELINED} requests may wait on one connection",
-            )
+            message = f"at most {MAX_PIPELINED} requests may wait on one connection"
+            self._stop(Refusal(HTTPStatus.TOO_MANY_REQUESTS, "too_many_requests", message))
 
     def on_url(self, url: bytes) -> None:
         """A part of the target."""
         super().on_url(url)
         if len(self.url) > self._settings.max_line_bytes:
-            self._stop(
-                HTTPStatus.REQUEST_URI_TOO_LONG,
-                "target_too_long",
-                f"the target of a request may have {self._settings.max_line_bytes} bytes",
-            )
+            message = f"the target of a request may have {self._settings.max_line_bytes} bytes"
+            self._stop(Refusal(HTTPStatus.REQUEST_URI_TOO_LONG, "target_too_long", message))
 
     def on_header(self, name: bytes, value: bytes) -> None:
         """A header; what comes after a body is none."""
@@ -183,9 +189,9 @@ class LimitedHttp(HttpToolsProtocol):
             return
         self._header_count += 1
         if self._header_count > self._settings.max_headers:
-            self._stop(*self._too_large("a request", "max_headers"))
+            self._stop(head_too_large("a request", self._settings.max_headers, "headers"))
         if len(name) + len(value) > self._settings.max_line_bytes:
-            self._stop(*self._too_large("one header", "max_line_bytes"))
+            self._stop(head_too_large("one header", self._settings.max_line_bytes))
         super().on_header(name, value)
 
     def on_headers_complete(self) -> None:
@@ -198,7 +204,7 @@ class LimitedHttp(HttpToolsProtocol):
         paid = self._limits.requests.take(sender, self._body_since)
         if not paid and not any(name in CREDENTIALS for name, _ in self.headers):
             error = too_many_requests()
-            self._stop(HTTPStatus(error.status), error.code, error.message)
+            self._stop(Refusal(HTTPStatus(error.status), error.code, error.message))
         self._judge = functools.partial(self._judged, sender, paid)
         self.scope[JUDGED] = self._judge  # type: ignore[literal-required]
         waits = self.cycle is not None and not self.cycle.response_complete
@@ -209,9 +215,6 @@ class LimitedHttp(HttpToolsProtocol):
         """A part of the body."""
         super().on_body(body)
         self._body_bytes += len(body)
-        allowed = self._settings.max_head_bytes + WRAPPING * self._body_bytes + SLICE
-        if self._body_fed > allowed:
-            self._stop(*self._too_large("the wrapping of a body", "max_head_bytes"))
 
     def on_message_complete(self) -> None:
         """The request is whole."""
@@ -257,17 +260,8 @@ class LimitedHttp(HttpToolsProtocol):
 
     # Refusing
 
-    def _too_large(self, what: str, setting: str) -> _Refusal:
-        most = getattr(self._settings, setting)
-        unit = "headers" if setting == "max_headers" else "bytes"
-        return _Refusal(
-            HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE,
-            "head_too_large",
-            f"{what} may have {most} {unit}",
-        )
-
-    def _stop(self, status: HTTPStatus, code: str, message: str) -> None:
-        self._refusal = _Refusal(status, code, message)
+    def _stop(self, why: Refusal) -> None:
+        self._refusal = why
         raise _RefusedError
 
     def _expired(self) -> None:
@@ -275,11 +269,11 @@ class LimitedHttp(HttpToolsProtocol):
             self.transport.close()
         elif self._in_head or self._in_body:
             message = "the request did not come in time"
-            self._refuse(_Refusal(HTTPStatus.REQUEST_TIMEOUT, "request_timeout", message))
+            self._refuse(Refusal(HTTPStatus.REQUEST_TIMEOUT, "request_timeout", message))
         else:
             self.transport.close()
 
-    def _refuse(self, why: _Refusal) -> None:
+    def _refuse(self, why: Refusal) -> None:
         """Say why, if an answer can be told from those before, and close."""
         cycle = self.cycle
         busy = cycle is not None and not cycle.response_complete
@@ -290,7 +284,7 @@ class LimitedHttp(HttpToolsProtocol):
         if busy:
             self.transport.close()
             return
-        self.transport.write(refusal(*why))
+        self.transport.write(why.answer())
         self._linger()
 
     def _linger(self) -> None:

@@ -103,6 +103,8 @@ class Server(uvicorn.Server):
         super().__init__(config)
         self._app = app
         self._settings = settings
+        self.table: ConnectionTable | None = None
+        """Its connections, once it listens."""
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -115,7 +117,7 @@ class Server(uvicorn.Server):
         settings = self._settings.connections
         shares = current_shares(settings.max_strangers)
         log.debug("connections: %s", shares)
-        table = ConnectionTable(*shares, settings.max_per_address)
+        table = self.table = ConnectionTable(*shares, settings.max_per_address)
         limits = HttpLimits.make(settings, table, self._app.state.gatekeeper)
 
         def protocol(connection: Connection) -> asyncio.Protocol:

@@ -12,12 +12,14 @@ from typing import Any
 
 import httpx
 import uvloop
+from fastapi import FastAPI
 from websockets.sync.client import ClientConnection, connect
 
 from app.config import ConnectionSettings, GatewaySettings, RobotSettings, Settings
 from app.gateway.app import create_app
+from app.gateway.connection_table import ConnectionTable
 from app.gateway.hub import Hub
-from app.gateway.serve import bind, make_server
+from app.gateway.serve import Server, bind, make_server
 from app.link.header import FrameHeader
 from app.link.messages import (
     CameraDescription,
@@ -74,12 +76,21 @@ def settings_for(folder: Path, endpoint: str | None = None, **gateway: Any) -> S
 class Running:
     """A server that runs."""
 
-    def __init__(self, port: int, hub: Hub) -> None:
+    def __init__(self, port: int, app: FastAPI, server: Server) -> None:
+        hub: Hub = app.state.hub
+        self.app = app
+        self.server = server
         self.port = port
         self.hub = hub
         self.host = f"127.0.0.1:{port}"
         self.url = f"http://{self.host}"
         self.http = httpx.Client(base_url=self.url, headers=BEARER, timeout=60, trust_env=False)
+
+    @property
+    def table(self) -> ConnectionTable:
+        """Its connections."""
+        assert self.server.table is not None
+        return self.server.table
 
     def operator(self, **options: Any) -> "Operator":
         """A new operator session."""
@@ -172,7 +183,7 @@ def running(settings: Settings) -> Iterator[Running]:
         listener.close()
         raise failed[0]
     wait_for(lambda: server.started, "the server to start")
-    here = Running(port, app.state.hub)
+    here = Running(port, app, server)
     try:
         yield here
     finally:
