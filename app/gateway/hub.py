@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import threading
 from collections.abc import AsyncIterator, Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AsyncExitStack, asynccontextmanager
@@ -79,6 +80,10 @@ class Hub:
         self.jobs = Jobs()
         self._link_threads = ThreadPoolExecutor(LINK_THREADS, "link")
         self._stop_threads = ThreadPoolExecutor(STOP_THREADS, "stop")
+        # All of them now: a system that is short of threads later gives a stop none.
+        together = threading.Barrier(STOP_THREADS)
+        for _ in range(STOP_THREADS):
+            self._stop_threads.submit(together.wait)
         self._told_version = gallery.version
         self._told_problem = keeper.problem
 

@@ -1,11 +1,13 @@
 """How descriptors are divided, and what a low limit does."""
 
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
-from app.gateway.descriptors import LEAST, MOST, RESERVE, share
+from app.gateway.descriptors import LEAST, MOST, RESERVE, TIGHT, share
 
 RAISE = """
 import logging, resource, sys
@@ -54,3 +56,12 @@ def test_strangers_leave_room_for_files_and_for_who_is_signed_in(limit: int) -> 
 
 def test_even_a_full_process_can_be_connected_to() -> None:
     assert share(LEAST, LEAST, 256) == (16, 8)
+
+
+def test_the_unit_in_the_docs_gives_what_is_asked_for() -> None:
+    text = (Path(__file__).parents[2] / "docs" / "deploy.md").read_text()
+    unit = dict(re.findall(r"^(\w+)=(.*)$", text.split("```ini")[1].split("```")[0], re.MULTILINE))
+    assert int(unit["LimitNOFILE"]) == MOST
+    assert unit["UMask"] == "0077"
+    assert f"warns below {TIGHT}, and does not start below {LEAST}" in text
+    assert f"at least {RESERVE}" in text
