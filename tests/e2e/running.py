@@ -101,7 +101,7 @@ def start_server(
             text=True,
             cwd=cwd,
             env=env,
-            preexec_fn=limit,
+            preexec_fn=None if files is None else limit,
         )  # fmt: skip
     assert process.stdout is not None
     for line in process.stdout:
