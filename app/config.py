@@ -585,6 +585,106 @@ class GatewaySettings(_Section):
     viser: bool = Field(default=True, description="serve the live 3D view at /viser/")
 
 
+class ConnectionSettings(_Section):
+    """What those who are not signed in may take of the server, and how long anything may last.
+
+    A connection counts as signed in once a request on it has brought a good token or cookie.
+    """
+
+    max_strangers: int = Field(
+        default=256,
+        ge=8,
+        le=10_000,
+        description="connections at once of those who are not signed in; fewer where the limit of "
+        "open files leaves fewer. For one more the one that has been silent longest is closed",
+    )
+    max_per_address: int = Field(
+        default=64,
+        ge=1,
+        le=10_000,
+        description="the same from one address (of IPv6: one /64). An address from which somebody "
+        "is signed in, and a proxy, may have as many as all",
+    )
+    begin_s: float = Field(
+        default=10.0,
+        gt=0.0,
+        le=300.0,
+        description="time from the connection, TLS handshake included, to the first byte asked",
+    )
+    head_s: float = Field(
+        default=10.0,
+        gt=0.0,
+        le=300.0,
+        description="time from the first byte of a request's head to its last",
+    )
+    body_s: float = Field(
+        default=10.0,
+        gt=0.0,
+        le=300.0,
+        description="time for the body of a request by somebody who is not signed in",
+    )
+    idle_s: float = Field(
+        default=10.0,
+        gt=0.0,
+        le=300.0,
+        description="time between two requests of somebody who is not signed in",
+    )
+    unread_s: float = Field(
+        default=10.0,
+        gt=0.0,
+        le=300.0,
+        description="time that somebody who is not signed in may leave an answer unread",
+    )
+    keep_alive_s: int = Field(
+        default=30, ge=1, le=3600, description="time between two requests of who is signed in"
+    )
+    transfer_s: float = Field(
+        default=300.0,
+        gt=0.0,
+        le=86_400.0,
+        description="time for a body of who is signed in, and for an answer that is not read",
+    )
+    max_line_bytes: int = Field(
+        default=8000,
+        ge=256,
+        le=8000,
+        description="bytes of a request's target, and of one header with its name",
+    )
+    max_headers: int = Field(default=100, ge=10, le=120, description="headers of one request")
+    max_head_bytes: int = Field(
+        default=32 * 1024, ge=1024, le=1 << 20, description="bytes of a request's head"
+    )
+    max_body_bytes: int = Field(
+        default=16 * 1024,
+        ge=4096,
+        le=1 << 20,
+        description="bytes of a request's body of somebody who is not signed in",
+    )
+    requests_per_s: float = Field(
+        default=20.0,
+        gt=0.0,
+        le=10_000.0,
+        description="requests a second, in the long run, from one address without being signed in",
+    )
+    all_requests_per_s: float = Field(
+        default=100.0, gt=0.0, le=10_000.0, description="the same from all addresses together"
+    )
+    begins_per_s: float = Field(
+        default=50.0,
+        ge=1.0,
+        le=10_000.0,
+        description="connections a second, in the long run, that may begin (a TLS handshake, a "
+        "first request) without being signed in; others wait. Those of addresses from which "
+        "somebody is signed in are counted apart",
+    )
+    burst_s: float = Field(
+        default=5.0,
+        ge=1.0,
+        le=60.0,
+        description="so many seconds' worth of requests may come at once",
+    )
+
+
 class MemorySettings(_Section):
     """What the server remembers of what happened."""
 
@@ -652,4 +752,5 @@ class Settings(BaseSettings):
     pipeline: PipelineSettings = PipelineSettings()
     robot: RobotSettings = RobotSettings()
     gateway: GatewaySettings = GatewaySettings()
+    connections: ConnectionSettings = ConnectionSettings()
     memory: MemorySettings = MemorySettings()

@@ -21,6 +21,7 @@ LIVE = (
     "e2e/test_stops.py",
     "e2e/test_timeline.py",
     "gateway/test_real_robot.py",
+    "gateway/test_strangers.py",
     "robot/test_camera.py",
     "robot/test_dry_run.py",
     "robot/test_node.py",

@@ -8,6 +8,7 @@ import time
 from http import HTTPStatus
 
 from starlette.datastructures import Headers, MutableHeaders, QueryParams
+from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -16,6 +17,7 @@ from app.gateway.auth import Gatekeeper, Identity
 from app.gateway.body_watch import STRANGER_S, WatchedBody
 from app.gateway.errors import error_body, error_response, unexpected_response
 from app.gateway.fetch_metadata import is_foreign
+from app.gateway.http_limits import is_answered, too_many_requests
 from app.gateway.page_secret import hide_proof
 from app.gateway.pages import again_page, sign_in_page
 from app.gateway.roles import WEBSOCKET, find
@@ -95,11 +97,17 @@ class Guard:
 
         try:
             refusal, identity = self._judge(scope, method, path)
+            known = identity is not None or scope.get("farhand.known", False)
+            if not is_answered(scope, known):
+                busy = too_many_requests()
+                refusal = error_response(busy, {"Retry-After": "1", "Connection": "close"})
             scope["farhand.identity"] = identity
             protocol = hide_proof(scope)
             if refusal is None:
                 try:
                     await self._pass(scope, receive, send_on, identity)
+                except ClientDisconnect:
+                    log.debug("%s %s: the client is gone", method, path[:200])
                 except Exception:
                     log.exception("%s %s failed", method, path[:200])
                     if status == 0 and not websocket:
@@ -170,6 +178,10 @@ class Guard:
         except TooManyGuesses as error:
             return too_many_response(error), None
         except (NotAllowed, RequestError) as error:
+            # Who may not do this has shown who they are, unless nobody looked.
+            scope["farhand.known"] = (
+                isinstance(error, NotAllowed) and error.code != "not_through_proxy"
+            )
             return error_response(error), None
         return (None if found.access else _not_there(method, path, found.methods)), identity
 

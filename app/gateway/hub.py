@@ -3,6 +3,7 @@
 import asyncio
 import functools
 import logging
+import threading
 import time
 from collections.abc import AsyncIterator, Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -120,6 +121,10 @@ class Hub:
         self._refresh_thread = ThreadPoolExecutor(1, "refresh")
         self._link_threads = ThreadPoolExecutor(LINK_THREADS, "link")
         self._stop_threads = ThreadPoolExecutor(STOP_THREADS, "stop")
+        # All of them now: a system that is short of threads later gives a stop none.
+        together = threading.Barrier(STOP_THREADS)
+        for _ in range(STOP_THREADS):
+            self._stop_threads.submit(together.wait)
         self._told_version = gallery.version
         self._told_problem = keeper.problem
 

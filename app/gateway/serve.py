@@ -21,9 +21,14 @@ from app import logs
 from app.config import Settings
 from app.errors import CannotStart
 from app.gateway.app import create_app
-from app.gateway.front import SecureFront
+from app.gateway.connection_table import Connection, ConnectionTable
+from app.gateway.descriptors import current_shares, raise_limit
 from app.gateway.given_token import with_given_token
 from app.gateway.greeting import greet
+from app.gateway.http_limits import HttpLimits
+from app.gateway.http_protocol import LimitedHttp
+from app.gateway.listener import Listener
+from app.gateway.machine import parse_address
 from app.gateway.tls import LocalAuthority
 from app.gateway.tokens import TokenStore
 from app.gateway.transport import check_transport, keep_certificate, local_authority
@@ -34,7 +39,7 @@ log = logging.getLogger(__name__)
 
 LOCK_FILE = "server.lock"
 """In the data folder; held by the server that uses it."""
-BACKLOG = 128
+BACKLOG = 512
 SOCKET_CEILING = 16 << 20
 """Bytes of a WebSocket message at which uvicorn itself cuts the connection. Far above our own
 limit, so that a message over that is still read and the connection closed with 1009 in order:
@@ -95,9 +100,12 @@ def bind(settings: Settings) -> socket.socket:
 class Server(uvicorn.Server):
     """uvicorn, with the order of starting and ending that a robot needs."""
 
-    def __init__(self, config: uvicorn.Config, app: FastAPI) -> None:
+    def __init__(self, config: uvicorn.Config, app: FastAPI, settings: Settings) -> None:
         super().__init__(config)
         self._app = app
+        self._settings = settings
+        self.table: ConnectionTable | None = None
+        """Its connections, once it listens."""
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -105,24 +113,35 @@ class Server(uvicorn.Server):
         yield
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Listen as uvicorn does; over HTTPS by a front that answers plain HTTP, too."""
-        context = self.config.ssl
-        if context is None or not sockets:
-            await super().startup(sockets)
-            return
+        """Listen, by a listener that counts and limits."""
         await super().startup([])
+        settings = self._settings.connections
+        shares = current_shares(settings.max_strangers)
+        log.debug("connections: %s", shares)
+        table = self.table = ConnectionTable(*shares, settings.max_per_address)
+        limits = HttpLimits.make(settings, table, self._app.state.gatekeeper)
 
-        def protocol() -> asyncio.Protocol:
-            # As uvicorn makes it for its own listeners.
-            made: asyncio.Protocol = self.config.http_protocol_class(  # type: ignore[call-arg]
+        def protocol(connection: Connection) -> asyncio.Protocol:
+            return LimitedHttp(
+                connection=connection,
+                limits=limits,
+                # As uvicorn makes it for its own listeners.
                 config=self.config,
                 server_state=self.server_state,
                 app_state=self.lifespan.state,
             )
-            return made
 
-        for listener in sockets:
-            self.servers.append(SecureFront(listener, context, protocol))  # type: ignore[arg-type]
+        for listener in sockets or []:
+            self.servers.append(
+                Listener(  # type: ignore[arg-type]
+                    listener, protocol, table, settings, self.config.ssl, self._is_proxy
+                )
+            )
+
+    def _is_proxy(self, host: str) -> bool:
+        address = parse_address(host) if self._settings.behind_proxy else None
+        proxies = self._settings.proxy_addresses
+        return address is not None and any(address in network for network in proxies)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """End endless answers first, then as uvicorn does."""
@@ -151,11 +170,10 @@ def make_server(
         ws_ping_interval=5.0,
         ws_ping_timeout=10.0,
         timeout_graceful_shutdown=GRACE_S,
-        timeout_keep_alive=30,
         ssl_certfile=cert,
         ssl_keyfile=key,
     )
-    return Server(config, app)
+    return Server(config, app, settings)
 
 
 class Signals:
@@ -238,8 +256,8 @@ def serve(settings: Settings) -> None:
     a terminal also one for observers, codes for phones, and how to trust the certificate.
 
     Raises:
-        CannotStart: the port, the data folder (also when another server has it), the page or the
-            certificate.
+        CannotStart: the port, the data folder (also when another server has it), the page, the
+            certificate, or the limit of open files.
         DatabaseBroken: the gesture database cannot be read.
     """
     for name, level in LOG_LEVELS.items():
@@ -254,6 +272,7 @@ def serve(settings: Settings) -> None:
 
 def _serve(settings: Settings) -> None:
     check_transport(settings)
+    raise_limit()
     signals = Signals()
     with (
         contextlib.closing(lock_data_folder(settings.data_dir)),

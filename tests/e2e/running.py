@@ -1,6 +1,7 @@
 """A real server with its robot node, for the browser tests and the benchmarks."""
 
 import re
+import resource
 import subprocess
 import sys
 import time
@@ -71,8 +72,23 @@ def start_server(
     cwd: Path = ROOT,
     env: dict[str, str] | None = None,
     stderr: int | None = None,
+    files: int | None = None,
 ) -> Server:
-    """Start a server on a free port and wait for its link; it logs to ``stderr``, if given."""
+    """Start a server on a free port and wait for its link.
+
+    Args:
+        folder: For its data and log.
+        *options: Of the command line.
+        cwd: Where it runs.
+        env: Its environment.
+        stderr: What it logs to, if not to a file.
+        files: How many it may open.
+    """
+
+    def limit() -> None:
+        if files is not None:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (files, files))
+
     log = folder / "server.log"
     with log.open("a") as file:
         process = subprocess.Popen(
@@ -85,6 +101,7 @@ def start_server(
             text=True,
             cwd=cwd,
             env=env,
+            preexec_fn=None if files is None else limit,
         )  # fmt: skip
     assert process.stdout is not None
     for line in process.stdout:

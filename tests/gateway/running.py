@@ -12,12 +12,14 @@ from typing import Any
 
 import httpx
 import uvloop
+from fastapi import FastAPI
 from websockets.sync.client import ClientConnection, connect
 
-from app.config import GatewaySettings, RobotSettings, Settings
+from app.config import ConnectionSettings, GatewaySettings, RobotSettings, Settings
 from app.gateway.app import create_app
+from app.gateway.connection_table import ConnectionTable
 from app.gateway.hub import Hub
-from app.gateway.serve import bind, make_server
+from app.gateway.serve import Server, bind, make_server
 from app.link.header import FrameHeader
 from app.link.messages import (
     CameraDescription,
@@ -53,6 +55,10 @@ def wait_for(condition: Callable[[], Any], what: str = "", timeout_s: float = WA
         time.sleep(0.005)
 
 
+MANY = ConnectionSettings(requests_per_s=10_000, all_requests_per_s=10_000, begins_per_s=10_000)
+"""Tests ask more in a second, without being signed in, than people do."""
+
+
 def settings_for(folder: Path, endpoint: str | None = None, **gateway: Any) -> Settings:
     """Settings of a server on a free port; with an endpoint, its node runs elsewhere."""
     robot = RobotSettings() if endpoint is None else RobotSettings(spawn=False, endpoint=endpoint)
@@ -64,18 +70,28 @@ def settings_for(folder: Path, endpoint: str | None = None, **gateway: Any) -> S
         token=TOKEN,
         robot=robot,
         gateway=GatewaySettings(**gateway),
+        connections=MANY,
     )
 
 
 class Running:
     """A server that runs."""
 
-    def __init__(self, port: int, hub: Hub) -> None:
+    def __init__(self, port: int, app: FastAPI, server: Server) -> None:
+        hub: Hub = app.state.hub
+        self.app = app
+        self.server = server
         self.port = port
         self.hub = hub
         self.host = f"127.0.0.1:{port}"
         self.url = f"http://{self.host}"
         self.http = httpx.Client(base_url=self.url, headers=BEARER, timeout=60, trust_env=False)
+
+    @property
+    def table(self) -> ConnectionTable:
+        """Its connections."""
+        assert self.server.table is not None
+        return self.server.table
 
     def operator(self, **options: Any) -> "Operator":
         """A new operator session."""
@@ -168,7 +184,7 @@ def running(settings: Settings) -> Iterator[Running]:
         listener.close()
         raise failed[0]
     wait_for(lambda: server.started, "the server to start")
-    here = Running(port, app.state.hub)
+    here = Running(port, app, server)
     try:
         yield here
     finally:

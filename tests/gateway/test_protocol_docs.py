@@ -12,7 +12,9 @@ from app.errors import FarhandError
 from app.gateway import messages
 from app.gateway.app import create_app
 from app.gateway.errors import _HTTP_CODES
+from app.gateway.http_protocol import MAX_PIPELINED
 from app.gateway.jobs import KEPT_S, MOST_KEPT, MOST_RUNNING
+from app.gateway.listener import KNOWN_RATE
 from app.gateway.messages import _CLIENT_MESSAGE
 from app.gateway.uploads import MAX_BURST, MAX_IMAGES
 from app.gestures.history import MAX_BYTES, MAX_CHANGES
@@ -133,6 +135,14 @@ def test_the_limits_are_the_settings() -> None:
     assert settings.gateway.max_observers == 100
     assert settings.gateway.max_frame_age_ms == 500
     assert settings.gateway.stop_confirm_ms == 300
+    limits = settings.connections
+    assert (limits.max_line_bytes, limits.max_head_bytes) == (8000, 32 * 1024)
+    assert (limits.max_headers, MAX_PIPELINED) == (100, 16)
+    assert {limits.begin_s, limits.head_s, limits.body_s, limits.idle_s, limits.unread_s} == {10.0}
+    assert (limits.transfer_s, limits.keep_alive_s) == (300.0, 30)
+    assert (limits.max_strangers, limits.max_per_address) == (256, 64)
+    assert (limits.begins_per_s, KNOWN_RATE) == (50.0, 4.0)
+    assert (limits.requests_per_s, limits.all_requests_per_s, limits.burst_s) == (20.0, 100.0, 5.0)
     assert (settings.memory.events, settings.memory.bytes) == (5000, 32 << 20)
     assert settings.gateway.picture_wait_s == 2.0
     assert settings.gateway.robot_rate_hz == 20

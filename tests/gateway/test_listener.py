@@ -1,16 +1,20 @@
-"""The HTTPS listener, over real sockets."""
+"""The listener, over real sockets."""
 
 import asyncio
 import contextlib
 import socket
 import ssl
+import time
 from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from app.gateway import front
-from app.gateway.front import SecureFront
+from app.config import ConnectionSettings
+from app.gateway.connection_table import Connection, ConnectionTable
+from app.gateway.listener import Listener
 from app.gateway.machine import machine_names
 from app.gateway.tls import LocalAuthority
 
@@ -27,7 +31,7 @@ class Echo(asyncio.Protocol):
 class Running:
     """A front, and clients that speak to it from threads."""
 
-    def __init__(self, port: int, trust: ssl.SSLContext, server: SecureFront) -> None:
+    def __init__(self, port: int, trust: ssl.SSLContext, server: Listener) -> None:
         self.port = port
         self.trust = trust
         self.server = server
@@ -65,22 +69,25 @@ class Running:
         return await asyncio.to_thread(talk)
 
 
-@pytest.fixture
-async def running(tmp_path: Path) -> AsyncIterator[Running]:
-    authority = LocalAuthority(tmp_path / "tls", machine_names)
+@asynccontextmanager
+async def listening(folder: Path, **values: Any) -> AsyncIterator[Running]:
+    """An HTTPS listener with these settings."""
+    authority = LocalAuthority(folder / "tls", machine_names)
     authority.prepare()
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.load_cert_chain(authority.server_file)
+    settings = ConnectionSettings(**values)
+    table = ConnectionTable(100, settings.max_strangers, settings.max_per_address)
     with socket.create_server(("127.0.0.1", 0)) as listener:
         listener.setblocking(False)
         trust = ssl.create_default_context(cadata=authority.public.pem.decode())
         made: list[Echo] = []
 
-        def protocol() -> Echo:
+        def protocol(_: Connection) -> Echo:
             made.append(Echo())
             return made[-1]
 
-        server = SecureFront(listener, context, protocol)
+        server = Listener(listener, protocol, table, settings, context)
         yield Running(listener.getsockname()[1], trust, server)
         server.close()
         await server.wait_closed()
@@ -88,6 +95,12 @@ async def running(tmp_path: Path) -> AsyncIterator[Running]:
             if hasattr(each, "transport"):
                 each.transport.close()
         await asyncio.sleep(0)
+
+
+@pytest.fixture
+async def running(tmp_path: Path) -> AsyncIterator[Running]:
+    async with listening(tmp_path) as here:
+        yield here
 
 
 async def test_tls_reaches_the_server_from_its_first_byte_on(running: Running) -> None:
@@ -112,30 +125,42 @@ async def test_plain_http_is_told_where_to_go(running: Running, head: bytes, tol
     assert len(answer.partition("\r\n\r\n")[2].encode()) == length
 
 
-async def test_who_says_nothing_or_nonsense_hinders_nobody(
-    running: Running, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_who_says_nothing_or_nonsense_hinders_nobody(running: Running) -> None:
     silent = [running.connect() for _ in range(5)]
     assert await running.echo(b"hello") == b"hello"
     for connection in silent:
         connection.close()
-    monkeypatch.setattr(front, "BEGIN_S", 0.05)
-    for data in (
-        b"", b"GET / HTTP/1.1\r\n", b"\x16\x03\x01 no handshake", b"\x00" * 5000, b"x" * 10_000
-    ):  # fmt: skip
-        answer = await running.plain(data)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [b"", b"GET / HTTP/1.1\r\n", b"\x16\x03\x01 no handshake", b"\x00" * 5000, b"x" * 10_000],
+)
+async def test_what_does_not_begin_ends_in_time(tmp_path: Path, data: bytes) -> None:
+    async with listening(tmp_path, begin_s=0.1) as here:
+        answer = await here.plain(data)
         assert answer == b"" or answer.startswith(b"HTTP/1.1 400 ")
-    monkeypatch.undo()
-    assert await running.echo(b"hello") == b"hello"
 
 
-async def test_there_is_a_limit_of_those_who_wait(
-    running: Running, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(front, "MAX_WAITING", 0)
-    assert await running.plain(b"GET / HTTP/1.1\r\n\r\n") == b""
-    monkeypatch.setattr(front, "MAX_WAITING", 10)
-    assert await running.echo(b"hello") == b"hello"
+async def test_one_more_than_there_may_be_closes_the_oldest(tmp_path: Path) -> None:
+    async with listening(tmp_path, max_strangers=8, max_per_address=8) as here:
+        silent = [here.connect() for _ in range(8)]
+        assert await here.echo(b"hello") == b"hello"
+        assert await asyncio.to_thread(silent[0].recv, 1) == b""
+        silent[1].settimeout(0.05)
+        with pytest.raises(TimeoutError):
+            await asyncio.to_thread(silent[1].recv, 1)
+        for connection in silent:
+            connection.close()
+
+
+async def test_connections_begin_in_turn_and_all_get_theirs(tmp_path: Path) -> None:
+    async with listening(tmp_path, begins_per_s=20) as here:
+        began = time.monotonic()
+        answers = await asyncio.gather(*(here.echo(b"hello") for _ in range(30)))
+        assert answers == [b"hello"] * 30
+        # Twenty at once; ten more take half a second at the least.
+        assert time.monotonic() - began > 0.4
 
 
 async def test_closing_accepts_nothing_more_and_ends_who_waits(running: Running) -> None:
