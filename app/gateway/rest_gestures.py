@@ -7,7 +7,7 @@ from fastapi import APIRouter, Query, Request
 from starlette.responses import Response
 
 from app.config import PipelineSettings
-from app.errors import ImageRefused, Invalid, NotFound
+from app.errors import ImageRefused, Invalid, NotFound, Unreadable
 from app.gateway.bodies import CHECK_BODY, ENROL_BODY, IMAGE_BODY, SAMPLES_BODY
 from app.gateway.enrolment import (
     Judged,
@@ -287,6 +287,8 @@ async def template(
 def _recognise(image: bytes, settings: PipelineSettings, enrolled: Enrolled) -> dict[str, Any]:
     try:
         extraction = extract_template(image, settings)
+    except Unreadable:
+        raise
     except ImageRefused as error:
         return {"match": None, "reason": error.message, "roi": None, "distances": {}}
     matched = enrolled.matcher(extraction.views)
