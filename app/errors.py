@@ -7,6 +7,7 @@
     │   ├── FrameRefused          a webcam frame that is not what the protocol asks for
     │   ├── MessageRefused        a text message of unknown type or with bad values
     │   ├── ImageRefused          an enrolment image without a usable hand
+    │   │   └── Unreadable        it is no picture, or none that is read here
     │   ├── NotFound              an id that does not exist
     │   ├── Duplicate             a name that is taken
     │   ├── ChangedMeanwhile      a change of something that somebody else has changed
@@ -77,6 +78,10 @@ class ImageRefused(RequestError):
 
     default_code = "image_refused"
     status = 422
+
+
+class Unreadable(ImageRefused):
+    """A file that is no picture, is broken, or has too many pixels."""
 
 
 class NotFound(RequestError):

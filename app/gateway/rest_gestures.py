@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from fastapi import APIRouter, Query, Request
 from starlette.responses import Response
 
-from app.errors import ImageRefused, Invalid, NotFound
+from app.errors import ImageRefused, Invalid, NotFound, Unreadable
 from app.gateway.bodies import CHECK_BODY, ENROL_BODY, IMAGE_BODY, SAMPLES_BODY
 from app.gateway.body_watch import still_allowed
 from app.gateway.connected import while_connected
@@ -345,6 +345,8 @@ async def template(
 async def _recognise(hub: "Hub", image: bytes, enrolled: Enrolled) -> dict[str, Any]:
     try:
         extraction = await hub.pictures.run(extract_template, image, hub.settings.pipeline)
+    except Unreadable:
+        raise
     except ImageRefused as error:
         return {"match": None, "reason": error.message, "roi": None, "distances": {}}
     matched = await hub.learners(enrolled.matcher, extraction.views)

@@ -21,7 +21,7 @@ from app.pipeline.still import extract_template
 from app.pipeline.trials import draw_trial, groups_of
 from app.pipeline.types import Extraction
 
-SUFFIXES = frozenset((".jpg", ".jpeg", ".png", ".webp"))
+SUFFIXES = frozenset((".jpg", ".jpeg", ".png", ".webp", ".heic", ".heif", ".avif"))
 UNKNOWN = "unknown"
 """Column of the confusion table for pictures that were rejected, or without a hand."""
 

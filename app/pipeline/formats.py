@@ -1,14 +1,15 @@
 """Image files for enrolment: what their headers say, read before anything is decoded.
 
-Formats: JPEG (ITU-T T.81), PNG (ISO/IEC 15948), WebP (RFC 9649); EXIF orientation (CIPA DC-008,
-tag 0x0112) from any of them.
+Formats: JPEG (ITU-T T.81), PNG (ISO/IEC 15948), WebP (RFC 9649), HEIC (ISO/IEC 23008-12) and AVIF;
+EXIF orientation (CIPA DC-008, tag 0x0112) from any of them.
 """
 
 import re
 import struct
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
-from app.errors import ImageRefused
+from app.errors import Unreadable
+from app.pipeline import heif
 
 MAX_WORK = 400_000_000
 """Pixels times scans of a JPEG. Progressive files with hundreds of scans can keep a decoder busy
@@ -22,15 +23,14 @@ class ImageInfo(NamedTuple):
     """What a file's header says.
 
     Attributes:
-        kind: ``jpeg``, ``png`` or ``webp``.
+        kind: ``jpeg``, ``png``, ``webp``, ``heic`` or ``avif``.
         width: Pixels as stored.
         height: Pixels as stored.
         orientation: EXIF orientation, 1 to 8; 1 is upright.
-        grey: JPEG with one component.
-        rgb: JPEG with three.
+        components: Of a JPEG: 1 is grey, 3 is colour.
     """
 
-    kind: str
+    kind: Literal["jpeg", "png", "webp", "heic", "avif"]
     width: int
     height: int
     orientation: int = 1
@@ -41,10 +41,10 @@ def read_info(data: bytes) -> ImageInfo:
     """Read a file's header.
 
     Raises:
-        ImageRefused: empty, of another format, cut short or broken.
+        Unreadable: empty, of another format, cut short or broken.
     """
     if not data:
-        raise ImageRefused("the file is empty: a JPEG, PNG or WebP picture is needed")
+        raise Unreadable("the file is empty: a JPEG, PNG, WebP, HEIC or AVIF picture is needed")
     try:
         if data[:2] == b"\xff\xd8":
             return _jpeg(data)
@@ -52,14 +52,16 @@ def read_info(data: bytes) -> ImageInfo:
             return _png(data)
         if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
             return _webp(data)
+        if (kind := heif.kind_of(data)) is not None:
+            return _heif(data, kind)
     except (IndexError, struct.error):
         raise cut_short() from None
-    raise ImageRefused("not a picture that can be read: JPEG, PNG or WebP is needed")
+    raise Unreadable("not a picture that can be read: JPEG, PNG, WebP, HEIC or AVIF is needed")
 
 
-def cut_short() -> ImageRefused:
+def cut_short() -> Unreadable:
     """The error for a file that ends too early."""
-    return ImageRefused("the picture is cut short or broken: please save it again")
+    return Unreadable("the picture is cut short or broken: please save it again")
 
 
 def _jpeg(data: bytes) -> ImageInfo:
@@ -80,7 +82,7 @@ def _jpeg(data: bytes) -> ImageInfo:
         if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
             height, width, components = struct.unpack_from(">HHB", data, at + 3)
             if size is not None or marker > 0xC2:
-                raise ImageRefused("a JPEG of a rare kind: baseline or progressive is needed")
+                raise Unreadable("a JPEG of a rare kind: baseline or progressive is needed")
             size = (width, height, components)
         elif marker == 0xE1 and data[at + 2 : at + 8] == b"Exif\0\0":
             orientation = _exif_orientation(data[at + 8 : at + length])
@@ -90,11 +92,11 @@ def _jpeg(data: bytes) -> ImageInfo:
     if size is None or scans == 0:
         raise cut_short()
     if size[2] not in (1, 3):
-        raise ImageRefused(
+        raise Unreadable(
             f"a JPEG with {size[2]} colour components: 1 (grey) or 3 (colour) are needed"
         )
     if size[0] * size[1] * scans > MAX_WORK:
-        raise ImageRefused(
+        raise Unreadable(
             f"a JPEG of {size[0]}x{size[1]} in {scans} scans takes too long to decode: "
             "please save it smaller, or as baseline"
         )
@@ -129,7 +131,7 @@ def _webp(data: bytes) -> ImageInfo:
             raise cut_short()
         if kind == b"VP8X":
             if body[0] & 0x02:
-                raise ImageRefused("an animated WebP: a single picture is needed")
+                raise Unreadable("an animated WebP: a single picture is needed")
             sizes.append(
                 (1 + int.from_bytes(body[4:7], "little"), 1 + int.from_bytes(body[7:10], "little"))
             )
@@ -146,6 +148,15 @@ def _webp(data: bytes) -> ImageInfo:
     if width == 0 or height == 0:
         raise cut_short()
     return ImageInfo("webp", width, height, orientation)
+
+
+def _heif(data: bytes, kind: heif.Kind) -> ImageInfo:
+    header = heif.read_header(data, kind)
+    if header is None:
+        raise cut_short()
+    if header.pictures > 1 and kind == "avif":
+        raise Unreadable("an animated AVIF: a single picture is needed")
+    return ImageInfo(kind, header.width, header.height)
 
 
 def _exif_orientation(tiff: bytes) -> int:

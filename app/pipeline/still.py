@@ -8,7 +8,8 @@ import simplejpeg
 from numpy.typing import NDArray
 
 from app.config import PipelineSettings
-from app.errors import ImageRefused, TooLarge
+from app.errors import ImageRefused, TooLarge, Unreadable
+from app.pipeline import heif
 from app.pipeline.binarise import Binarise
 from app.pipeline.channel import Channel
 from app.pipeline.formats import ImageInfo, cut_short, read_info
@@ -39,7 +40,7 @@ class Shot(NamedTuple):
 
 
 def read_image(data: bytes, settings: PipelineSettings) -> tuple[U8, int, int]:
-    """Decode a JPEG, PNG or WebP file, upright and scaled down.
+    """Decode a picture's file, upright and scaled down.
 
     Returns:
         (h, w, 3) BGR or (h, w, 1) grey, the longer side at most ``still.working_side``; then the
@@ -47,7 +48,7 @@ def read_image(data: bytes, settings: PipelineSettings) -> tuple[U8, int, int]:
 
     Raises:
         TooLarge: too many bytes.
-        ImageRefused: not a picture, broken, or too many pixels; judged by its header.
+        Unreadable: not a picture, broken, or too many pixels; judged by its header.
     """
     limits = settings.still
     if len(data) > limits.max_bytes:
@@ -60,20 +61,20 @@ def read_image(data: bytes, settings: PipelineSettings) -> tuple[U8, int, int]:
     # Other formats than JPEG have to be decoded at full size before they can be made smaller.
     most = limits.max_pixels if info.kind == "jpeg" else limits.max_pixels // 2
     if info.width * info.height > most:
-        raise ImageRefused(
+        raise Unreadable(
             f"the picture is {info.width}x{info.height}: at most {most / 1e6:.3g} million pixels "
             f"are accepted ({info.kind.upper()})",
             width=info.width,
             height=info.height,
         )
     if min(info.width, info.height) < MIN_SIDE:
-        raise ImageRefused(
+        raise Unreadable(
             f"the picture is {info.width}x{info.height}: at least {MIN_SIDE}x{MIN_SIDE} is needed",
             width=info.width,
             height=info.height,
         )
     try:
-        pixels = _jpeg(data, info, limits.working_side) if info.kind == "jpeg" else _other(data)
+        pixels = _pixels(data, info, limits.working_side)
     except (cv2.error, ValueError, RuntimeError, MemoryError):
         raise cut_short() from None
     scale = limits.working_side / max(pixels.shape[:2])
@@ -84,6 +85,20 @@ def read_image(data: bytes, settings: PipelineSettings) -> tuple[U8, int, int]:
     pixels = _upright(pixels.reshape(*pixels.shape[:2], -1), info.orientation)
     turned = info.orientation >= 5
     return pixels, *((info.height, info.width) if turned else (info.width, info.height))
+
+
+def _pixels(data: bytes, info: ImageInfo, side: int) -> U8:
+    match info.kind:
+        case "jpeg":
+            return _jpeg(data, info, side)
+        case "heic" | "avif":
+            shown = heif.decode(data, info.kind)
+            if shown is None:
+                raise cut_short()
+            # To BGR, and BGRA, as OpenCV has it.
+            order = [2, 1, 0, 3][: shown.shape[2]]
+            return _on_white(shown[:, :, order])
+    return _other(data)
 
 
 def _jpeg(data: bytes, info: ImageInfo, side: int) -> U8:
@@ -106,7 +121,11 @@ def _other(data: bytes) -> U8:
     pixels = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
     if pixels is None:
         raise cut_short()
-    pixels = pixels.reshape(*pixels.shape[:2], -1)
+    return _on_white(pixels.reshape(*pixels.shape[:2], -1))
+
+
+def _on_white(pixels: NDArray[Any]) -> U8:
+    """(h, w, 1 to 4) of 8 or 16 bits to (h, w, 1) grey or (h, w, 3) BGR of 8 bits."""
     height, width, planes = pixels.shape
     picture = np.empty((height, width, 1 if planes < 3 else 3), np.uint8)
     # Band by band: copies of a picture of 25 million pixels would take half a gigabyte.
@@ -141,14 +160,15 @@ def extract_template(data: bytes, settings: PipelineSettings, *, whole: bool = T
     """Find the hand in a photograph and make its template.
 
     Args:
-        data: JPEG, PNG or WebP; any size up to ``still.max_bytes`` and ``still.max_pixels``, colour
-            or grey, EXIF orientation honoured.
+        data: JPEG, PNG, WebP, HEIC or AVIF; any size up to ``still.max_bytes`` and
+            ``still.max_pixels``, colour or grey, EXIF orientation honoured.
         settings: Of the pipeline; the same as for live frames.
         whole: Refuse a hand that runs out of the picture.
 
     Raises:
         TooLarge: too many bytes.
-        ImageRefused: no picture, or no usable hand in it, with the reason in plain words.
+        Unreadable: no picture.
+        ImageRefused: no usable hand in it, with the reason in plain words.
     """
     found = _find(data, settings)
     if whole:

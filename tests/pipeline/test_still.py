@@ -1,6 +1,7 @@
 import io
 import struct
 import zlib
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -14,6 +15,9 @@ from app.pipeline import extract_template
 from app.pipeline.still import read_image
 from tests.pipeline.drawing import PHOTOS, SETTINGS, draw, encoded, jpeg
 
+DATA = Path(__file__).parent / "data"
+"""HEIC of the drawn hand, written by libheif with x265: upright, and turned with the orientation
+that undoes it. What reads them here cannot write them."""
 PICTURE = draw("two", noise=0)
 RGB = Image.fromarray(PICTURE[:, :, ::-1])
 REFERENCE = extract_template(encoded(PICTURE), SETTINGS)
@@ -61,6 +65,10 @@ def test_extraction_of_a_photograph():
         saved(RGB, "WEBP"),
         saved(RGB, "WEBP", lossless=True),
         saved(RGB.convert("RGBA"), "WEBP"),
+        saved(RGB, "AVIF"),
+        saved(RGB.convert("RGBA"), "AVIF"),
+        (DATA / "two.heic").read_bytes(),
+        (DATA / "two_turned.heic").read_bytes(),
         encoded(PICTURE.astype(np.uint16) * 257),
         saved(RGB.resize((3200, 2400)), "JPEG"),
         saved(RGB.resize((320, 240)), "PNG"),
@@ -76,6 +84,10 @@ def test_extraction_of_a_photograph():
         "webp",
         "webp lossless",
         "webp alpha",
+        "avif",
+        "avif alpha",
+        "heic",
+        "heic turned",
         "16 bit",
         "large",
         "small",
@@ -90,7 +102,7 @@ def test_silhouette_of_one_bit():
     assert like_reference(saved(Image.fromarray(mask).convert("1"), "PNG"))
 
 
-@pytest.mark.parametrize("kind", ["JPEG", "PNG", "WEBP"])
+@pytest.mark.parametrize("kind", ["JPEG", "PNG", "WEBP", "AVIF"])
 @pytest.mark.parametrize("orientation", range(1, 9))
 def test_exif_orientation_is_applied(kind, orientation):
     # What a viewer undoes: the inverse of each orientation.
@@ -112,6 +124,14 @@ def test_exif_orientation_is_applied(kind, orientation):
     assert np.abs(pixels.astype(int) - expected).mean() < 6
 
 
+def large(kind: str) -> bytes:
+    """A small file that says it is 9000x9000: in ``ispe``, ISO/IEC 23008-12 section 6.5.3."""
+    data = (DATA / "two.heic").read_bytes() if kind == "HEIC" else saved(RGB, "AVIF")
+    size = struct.pack(">4sIII", b"ispe", 0, 640, 480)
+    assert size in data
+    return data.replace(size, struct.pack(">4sIII", b"ispe", 0, 9000, 9000))
+
+
 def png_header(width: int, height: int) -> bytes:
     def chunk(kind: bytes, body: bytes) -> bytes:
         return (
@@ -125,13 +145,40 @@ def png_header(width: int, height: int) -> bytes:
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (b"", "the file is empty: a JPEG, PNG or WebP picture is needed"),
-        (b"GIF89a" + bytes(99), "not a picture that can be read: JPEG, PNG or WebP is needed"),
+        (b"", "the file is empty: a JPEG, PNG, WebP, HEIC or AVIF picture is needed"),
+        (
+            b"GIF89a" + bytes(99),
+            "not a picture that can be read: JPEG, PNG, WebP, HEIC or AVIF is needed",
+        ),
         (jpeg(PICTURE)[:-400], "the picture is cut short or broken: please save it again"),
         (encoded(PICTURE)[:-400], "the picture is cut short or broken: please save it again"),
         (
             saved(RGB, "WEBP")[:-400],
             "the picture is cut short or broken: please save it again",
+        ),
+        (
+            saved(RGB, "AVIF")[:-400],
+            "the picture is cut short or broken: please save it again",
+        ),
+        (
+            (DATA / "two.heic").read_bytes()[:-400],
+            "the picture is cut short or broken: please save it again",
+        ),
+        (
+            (DATA / "two.heic").read_bytes()[:60],
+            "the picture is cut short or broken: please save it again",
+        ),
+        (
+            saved(RGB, "AVIF", save_all=True, append_images=[RGB.rotate(9)]),
+            "an animated AVIF: a single picture is needed",
+        ),
+        (
+            large("HEIC"),
+            "the picture is 9000x9000: at most 25 million pixels are accepted (HEIC)",
+        ),
+        (
+            large("AVIF"),
+            "the picture is 9000x9000: at most 25 million pixels are accepted (AVIF)",
         ),
         (
             png_header(100_000, 100_000),

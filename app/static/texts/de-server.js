@@ -195,8 +195,9 @@ export const phrases = [
     ["stretch the thumb away from the hand when showing {}", "spreizen Sie bei „{1}“ den Daumen ab"],
     ["choose another sign for {} or {}, with another number of fingers stretched", "wählen Sie für „{1}“ oder „{2}“ ein anderes Zeichen, mit einer anderen Zahl gestreckter Finger"],
     ["choose another sign for {} or {}", "wählen Sie für „{1}“ oder „{2}“ ein anderes Zeichen"],
-    ["the file is empty: a JPEG, PNG or WebP picture is needed", "die Datei ist leer: Ein Bild als JPEG, PNG oder WebP ist nötig"],
-    ["not a picture that can be read: JPEG, PNG or WebP is needed", "kein lesbares Bild: JPEG, PNG oder WebP ist nötig"],
+    ["the file is empty: a JPEG, PNG, WebP, HEIC or AVIF picture is needed", "die Datei ist leer: Ein Bild als JPEG, PNG, WebP, HEIC oder AVIF ist nötig"],
+    ["not a picture that can be read: JPEG, PNG, WebP, HEIC or AVIF is needed", "kein lesbares Bild: JPEG, PNG, WebP, HEIC oder AVIF ist nötig"],
+    ["an animated {}: a single picture is needed", "ein animiertes {1}: Ein einzelnes Bild ist nötig"],
 
     // Names and numbers of gestures
     ["there is a gesture {} already; choose another name", "die Geste {1} gibt es schon; wählen Sie einen anderen Namen"],
