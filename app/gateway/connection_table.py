@@ -189,6 +189,12 @@ class ConnectionTable:
             if not connection.signed_in:
                 self._let_go(connection)
 
+    def close(self) -> None:
+        """End all there are."""
+        for connection in tuple(self._all):
+            self.remove(connection)
+            connection.end()
+
     def expire(self) -> None:
         """End what has not done in time what it had to."""
         now = self._clock()

@@ -100,7 +100,10 @@ class Listener:
     async def _check(self) -> None:
         while True:
             await asyncio.sleep(self._period)
-            self._table.expire()
+            try:
+                self._table.expire()
+            except Exception:
+                log.exception("what is late cannot be ended")
 
     def _accept(self) -> None:
         for _ in range(BATCH):

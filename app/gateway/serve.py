@@ -147,6 +147,8 @@ class Server(uvicorn.Server):
         """End endless answers first, then as uvicorn does."""
         self._app.state.hub.closing.set()
         await super().shutdown(sockets)
+        if self.table is not None:
+            self.table.close()  # whoever has not read to the end
 
 
 def make_server(

@@ -12,7 +12,7 @@ import pytest
 from tests.gateway.running import Running, StandIn, running, wait_for
 from tests.gateway.strangers import OWN, code, connect, head, limited, over_tls, read, send, status
 
-QUICK = {"begin_s": 0.3, "head_s": 0.3, "body_s": 0.3, "idle_s": 0.3, "unread_s": 0.3}
+QUICK = {"begin_s": 3.0, "head_s": 0.3, "body_s": 0.3, "idle_s": 0.3, "unread_s": 0.3}
 
 
 @contextmanager
@@ -100,7 +100,7 @@ def test_who_closes_without_reading_is_gone(folder: Path, node: StandIn) -> None
 
 def test_idle_connections_of_who_is_signed_in_last_longer(folder: Path, node: StandIn) -> None:
     with (
-        quick(folder, node, keep_alive_s=60) as server,
+        quick(folder, node, begin_s=60, head_s=60, keep_alive_s=60) as server,
         connect(server) as connection,
         connect(server) as stranger,
     ):
