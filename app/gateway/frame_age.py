@@ -7,6 +7,9 @@ from app.link.messages import COMMAND_TTL_MS
 SPARE_MS = 30
 """Of the 500 ms that are promised from sending to standstill a command's life and the ramp leave
 46; so much of them is for the way, and the rest for a loop that is late."""
+WAY_MS = 50
+"""At most so much is taken off for the shortest way up. Over a longer one the two frames that a
+page has under way come so far apart that nothing would be left until the next."""
 JUMP_MS = 250
 """A capture clock that disagrees with the bound by more has stood still, or was set."""
 DRIFT = 200e-6
@@ -17,14 +20,11 @@ class Age(NamedTuple):
     """What is known of how long something was under way when it arrived."""
 
     known_ms: int = 0
-    """As near as can be known; what it commands lives so much shorter."""
+    """As near as can be known."""
+    life_ms: int = COMMAND_TTL_MS
+    """What is left of the life of what it commands."""
     stale: str | None = None
     """Why it is too old to move anything, in plain words."""
-
-    @property
-    def life_ms(self) -> int:
-        """What is left of the life of a command."""
-        return max(0, COMMAND_TTL_MS - max(0, self.known_ms - SPARE_MS))
 
 
 class FrameAge:
@@ -38,6 +38,9 @@ class FrameAge:
     trip. So::
 
         age = o - min(o) + min(now - tick) / 2,    at most now - tick
+
+    What is over :data:`SPARE_MS` of it is taken off the life of the command, where the second part
+    counts for :data:`WAY_MS` at most.
 
     The minimum of ``o`` rises with :data:`DRIFT`, because clocks do not run alike, and begins anew
     where it is over the bound by :data:`JUMP_MS`: a clock that stood still makes nobody old.
@@ -79,21 +82,22 @@ class FrameAge:
         bound = float(now_ms - seen_tick) if seen_tick else float("inf")
         self._least_trip = min(self._least_trip, bound)
         way = self._least_trip / 2 if seen_tick else 0.0
+        late = bound - self._least_trip
         if advanced:
             late = self._lateness(now_ms - captured_ms, bound, way, now_ms)
-            known = round(min(late + way, bound))
-        else:
-            known = round(bound - way)
+            late = min(late, bound - way)
+        known = round(late + way)
+        life = COMMAND_TTL_MS - max(0, round(late + min(way, WAY_MS)) - SPARE_MS)
         if seen_tick and bound > self._limit:
             return self._stale(
                 known, f"its sender had seen nothing newer than {round(bound)} ms ago", self._limit
             )
-        if known >= COMMAND_TTL_MS + SPARE_MS:
+        if life <= 0:
             how = f"it came {known} ms later than others did"
             if seen_tick:
                 how = f"it was under way for {known} ms"
-            return self._stale(known, how, COMMAND_TTL_MS + SPARE_MS)
-        return Age(known)
+            return self._stale(known, how, known + life)
+        return Age(known, life)
 
     def _lateness(self, offset: float, bound: float, way: float, now_ms: int) -> float:
         """By how much an offset is over the least, ms; takes it in."""
@@ -107,6 +111,7 @@ class FrameAge:
     def _stale(self, known: int, how: str, limit_ms: int) -> Age:
         return Age(
             known,
+            0,
             f"the {self._what} is too old to move the robot: {how}, at most {limit_ms} ms are "
             "allowed",
         )
