@@ -654,12 +654,6 @@ class ConnectionSettings(_Section):
     max_head_bytes: int = Field(
         default=32 * 1024, ge=1024, le=1 << 20, description="bytes of a request's head"
     )
-    max_body_bytes: int = Field(
-        default=16 * 1024,
-        ge=4096,
-        le=1 << 20,
-        description="bytes of a request's body of somebody who is not signed in",
-    )
     requests_per_s: float = Field(
         default=20.0,
         gt=0.0,

@@ -20,7 +20,7 @@ _OURS = (
     "gestures.*",
     "memory.*",
     "server.lock",
-    "stop-*.latch*",
+    "stop-*",
     "tokens.*",
 )
 """Names of files in a data folder that are Farhand's. Others are left alone: somebody may keep more

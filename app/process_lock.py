@@ -111,6 +111,7 @@ def _open(path: Path, what: str) -> int:
             f"{what} cannot be used: its lock {path} cannot be opened ({reason}); give this user "
             "write permission, or choose another place",
             path=str(path),
+            errno=error.errno,
         ) from error
 
 

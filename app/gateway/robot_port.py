@@ -27,6 +27,8 @@ from app.link.messages import (
     StopRequest,
 )
 from app.link.session import socket_endpoint
+from app.process_lock import ProcessLock
+from app.robot.latch_lock import lock_latch
 from app.robot.models import model_assets
 from app.scratch import ScratchFolder, remove_left_behind
 
@@ -55,8 +57,8 @@ class RobotPort:
         settings: Of the whole server; a node is started when ``settings.robot.spawn`` is on.
 
     Raises:
-        CannotStart: the node runs elsewhere but no endpoint is given, or no private folder for
-            the link's socket can be made.
+        CannotStart: the node runs elsewhere but no endpoint is given, no private folder for the
+            link's socket can be made, or another node has the stop latch.
         LinkFailed: the socket's path is too long.
     """
 
@@ -75,12 +77,16 @@ class RobotPort:
         self._ending = threading.Event()
         self._folder: ScratchFolder | None = None
         self._process: NodeProcess | None = None
+        self._latch_lock: ProcessLock | None = None
         self.stop_memory = StopMemory(settings.data_dir / f"stop-{self.id}.remembered")
         endpoint = settings.robot.endpoint
         profile = settings.robot.profile or DEFAULT_PROFILE
         if settings.robot.profile is not None:
             model_assets(profile)  # a wrong one is told now, in a line, and not by a node that dies
         if settings.robot.spawn:
+            latch = settings.data_dir / f"stop-{self.id}.latch"
+            # Ours, not the node's: one that was killed may have it until its disk answers.
+            self._latch_lock = lock_latch(latch)
             try:
                 remove_left_behind()
                 # Of mode 0700, so that nobody else reaches the socket in it.
@@ -88,7 +94,6 @@ class RobotPort:
             except OSError as error:
                 raise CannotStart(f"no private folder for the link: {error}") from error
             endpoint = socket_endpoint(self._folder.path / "link")
-            latch = settings.data_dir / f"stop-{self.id}.latch"
             self._process = NodeProcess(
                 node_command(self.id, endpoint, latch, profile),
                 last_word=lambda: self._state_at,
@@ -122,6 +127,8 @@ class RobotPort:
             self._process.close()
         if self._folder is not None:
             self._folder.close()
+        if self._latch_lock is not None:
+            self._latch_lock.close()
         self.stop_memory.close()
 
     # What is known

@@ -1,11 +1,11 @@
 """Guessing is slowed: a few wrong tokens from one address, and many from all, then 429."""
 
-import ipaddress
 import time
 from collections import OrderedDict
 from collections.abc import Callable
 
 from app.errors import RequestError
+from app.gateway.machine import address_group
 
 ADDRESS_TRIES = 5
 PAUSE_S = 60.0
@@ -66,7 +66,7 @@ class Throttle:
         now = self._clock()
         self._left = min(ALL_TRIES, self._left + (now - self._refilled) / ALL_REFILL_S)
         self._refilled = now
-        own = self._addresses.get(_group(address))
+        own = self._addresses.get(address_group(address))
         if own is not None:
             if digest in own.wrong:
                 return
@@ -80,7 +80,7 @@ class Throttle:
 
     def failed(self, address: str, digest: str) -> None:
         """The token with this hash was wrong, from ``address``."""
-        group = _group(address)
+        group = address_group(address)
         own = self._addresses.pop(group, None) or _Own()
         self._addresses[group] = own
         if digest in own.wrong:
@@ -94,7 +94,7 @@ class Throttle:
 
     def succeeded(self, address: str, digest: str) -> None:
         """The token with this hash was right, from ``address``."""
-        key = (_group(address), digest)
+        key = (address_group(address), digest)
         self._known.pop(key, None)
         self._known[key] = None
         if len(self._known) > MAX_KEPT:
@@ -102,23 +102,10 @@ class Throttle:
 
     def knows(self, address: str, digest: str) -> bool:
         """Whether this very token was right from this address before."""
-        return (_group(address), digest) in self._known
+        return (address_group(address), digest) in self._known
 
 
 def _too_many(seconds: int) -> TooManyGuesses:
     return TooManyGuesses(
         f"too many wrong tokens were sent; wait {seconds} s", retry_after_s=seconds
     )
-
-
-def _group(address: str) -> str:
-    """The address; of IPv6 the half that one customer is given."""
-    try:
-        parsed = ipaddress.ip_address(address.partition("%")[0])
-    except ValueError:
-        return address[:64]
-    if isinstance(parsed, ipaddress.IPv4Address):
-        return str(parsed)
-    if parsed.ipv4_mapped is not None:
-        return str(parsed.ipv4_mapped)
-    return str(ipaddress.ip_network((parsed, 64), strict=False))

@@ -20,15 +20,15 @@ from pydantic import ValidationError
 
 from app import logs
 from app.config import NodeSettings
-from app.errors import CannotStart, FarhandError
+from app.errors import FarhandError
 from app.link.messages import StopRequest
 from app.link.node_end import NodeEnd
 from app.private import keep_private
-from app.process_lock import ProcessLock
 from app.robot.arm import Arm
 from app.robot.child import Child
 from app.robot.controller import DT, Controller
 from app.robot.latch import StopLatch
+from app.robot.latch_lock import lock_latch
 from app.robot.loop_clock import LoopClock, keep_time
 
 log = logging.getLogger(__name__)
@@ -38,8 +38,6 @@ LINE = "%(asctime)s %(levelname)s node %(name)s: %(message)s"
 STATE_EVERY = 4
 """Cycles between two states: 60 a second."""
 _PARENT_EVERY = 24
-HANDOVER_S = 3.0
-"""A node waits so long for one before it that is just ending, since its gateway was killed."""
 _LAST_CYCLES = 120
 """At most this long (0.5 s) the loop goes on after it was asked to end, for the arm to stop."""
 
@@ -134,7 +132,9 @@ def run_node(settings: NodeSettings, arm: Arm | None = None) -> None:
             latch.
         LinkFailed: the link's endpoint cannot be opened.
     """
-    lock = None if settings.latch is None else lock_latch(settings.latch)
+    lock = None
+    if settings.latch is not None and settings.parent is None:
+        lock = lock_latch(settings.latch)  # else whoever starts us has it, over our restarts
     if arm is None:
         # Imported here: PyBullet takes a second, and greets on standard output.
         from app.robot.sim.robot import simulated
@@ -165,28 +165,6 @@ def run_node(settings: NodeSettings, arm: Arm | None = None) -> None:
         node.close()
         if lock is not None:
             lock.close()
-
-
-def lock_latch(latch: Path) -> ProcessLock:
-    """Keep every other node from the same stop latch: its reset would delete our stop.
-
-    Raises:
-        CannotStart: another node has it and does not end, or the lock cannot be made.
-    """
-    try:
-        latch.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise CannotStart(
-            f"the folder of the stop latch {latch} cannot be made ({error.strerror}); name a file "
-            "in a folder of yours",
-            path=str(latch),
-        ) from error
-    return ProcessLock(
-        latch.with_name(latch.name + ".lock"),
-        f"the stop latch {latch}",
-        "end that robot node first, or give this one a latch of its own",
-        wait_s=HANDOVER_S,
-    )
 
 
 def camera_command(settings: NodeSettings) -> list[str]:

@@ -35,6 +35,7 @@ from app.gateway.serve import LOCK_FILE, bind, lock_data_folder
 from app.gateway.tls import FOLDER, read_authority
 from app.gateway.tokens import TokenStore
 from app.gateway.transport import check_transport, keep_certificate, local_authority
+from app.robot.latch_lock import lock_latch
 from benchmarks.node_process import free_port
 from benchmarks.scene_cost import CAMERA
 from tests.gateway.browser import SignedIn
@@ -227,6 +228,9 @@ def test_a_data_folder_is_closed_to_other_users(folder: Path) -> None:
         assert made >= {"gestures.db", "memory.db", "tokens.json", "stop-puma.latch.lock"}
         for path in [data, *data.rglob("*")]:
             assert path.stat().st_mode & 0o077 == 0, path
+        # Its node's latch is nobody else's either.
+        with pytest.raises(CannotStart, match=f"in use by process {process.pid} since"):
+            lock_latch(data / "stop-puma.latch")
 
 
 def test_a_data_folder_of_another_kind_is_one_clear_line(tmp_path: Path) -> None:
