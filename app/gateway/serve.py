@@ -52,7 +52,6 @@ LOG_LEVELS = {
     "uvicorn": logging.WARNING,
     "uvicorn.access": logging.CRITICAL,
     "websockets": logging.WARNING,
-    "httpx": logging.WARNING,
     "httpcore": logging.WARNING,
     "alembic": logging.WARNING,
 }
