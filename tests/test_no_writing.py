@@ -19,16 +19,19 @@ BEFORE = "before the loop begins"
 THREAD = "in a thread of its own"
 MAY_WRITE = {
     "app/gateway/greeting.py": "in a thread of its own, to a stream that waits for nobody",
+    "app/gateway/gallery.py::open_store": f"{THREAD}, before anything is served",
     "app/gateway/robot_port.py": "a folder for the link: before the node starts, and after its end",
+    "app/gateway/serve.py::lock_data_folder": "before anything is served",
     "app/gateway/tls.py": f"{THREAD}, or before anything is served",
     "app/gateway/tokens.py::TokenStore._change": "by the command line, and by the greeting",
     "app/gateway/viser_server.py::PrivateServer": "a folder for the socket: the 3D view's thread",
+    "app/link/node_end.py::NodeEnd.__init__": BEFORE,
     "app/link/node_end.py::private_folder": BEFORE,
     "app/robot/beside.py::give_way": "the processes beside the node, when they start",
     "app/robot/latch.py::StopLatch._begin": "the latch's thread, when it begins",
     "app/robot/latch_file.py": "the latch's thread alone, which nobody waits for",
     "app/robot/models/": f"{BEFORE}, or in a process beside it",
-    "app/robot/node.py::lock_latch": BEFORE,
+    "app/robot/latch_lock.py::_take": "a thread of its own, and a lock between processes",
     "app/robot/node.py::main": BEFORE,
     "app/robot/sim/__init__.py": BEFORE,
     "app/robot/sim/scenery.py::_load_visuals": "the camera process, when it starts",
@@ -43,6 +46,8 @@ CALLS = {
     "StreamHandler", "symlink_to", "SysLogHandler", "TemporaryDirectory", "TemporaryFile", "touch",
     "truncate", "unlink", "write_bytes", "write_text", "writelines",
 }  # fmt: skip
+OURS = {"private_file", "private_folder", "ProcessLock", "ScratchFolder"}
+"""What of ours writes at once, in a module that is not watched."""
 OF_OS = {"fdopen", "link", "mkfifo", "open", "remove", "replace", "sendfile", "symlink", "write"}
 STREAMS = {"stdout", "stderr", "__stdout__", "__stderr__"}
 
@@ -72,7 +77,7 @@ class Writes(ast.NodeVisitor):
     def visit_Call(self, node: ast.Call) -> None:
         function = node.func
         if isinstance(function, ast.Name):
-            if function.id in CALLS or (function.id == "open" and _writes(node, 1)):
+            if function.id in CALLS | OURS or (function.id == "open" and _writes(node, 1)):
                 self._note(node, function.id)
         elif isinstance(function, ast.Attribute):
             name, of = function.attr, function.value

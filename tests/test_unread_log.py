@@ -106,6 +106,7 @@ def test_a_node_that_runs_by_itself(reader: Reader, tmp_path: Path) -> None:
             driver.end.close()
         node.terminate()
         assert node.wait(30) == 0
+        reader.finish()
         assert "INFO ending: asked to end" in reader.text
     finally:
         node.kill()

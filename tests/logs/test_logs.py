@@ -153,7 +153,7 @@ def test_read_as_ever_all_comes_and_before_the_end(reader: Reader) -> None:
         r"UserWarning: warning 7\n",
         r"WARNING alone 7\n",
         r"a line of x cannot be put together: TypeError\n",
-        r"ERROR failed\nTraceback \(most recent call last\):\n.*\nValueError: error 7\n",
+        r"ERROR failed\n  Traceback \(most recent call last\):\n.*\n  ValueError: error 7\n",
         r"ZeroDivisionError: division by zero\n",
         r"begun$",
     ):
