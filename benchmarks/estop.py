@@ -37,9 +37,11 @@ from benchmarks.observer import tick_now, wait, wait_async
 from benchmarks.operator import Operator
 from benchmarks.report import arguments, percentiles, promise, report
 from benchmarks.rig import TOKEN, Rig, clip
-from benchmarks.siege import Disk, besiege, unread_pipe
+from benchmarks.siege import besiege, unread_pipe
+from tests.disks import Disk, freezable
 
 VIEWERS = 20
+DISK_MIB = 128
 P99_MS = 300.0
 MAX_MS = 500.0
 SHOWING = 180
@@ -211,10 +213,10 @@ def measure(runs: int, restarts: int, *, siege: bool) -> dict[str, dict[str, flo
     survived = done = 0
     block = -(-runs // max(restarts, 1))
     with contextlib.ExitStack() as around:
-        disk = around.enter_context(Disk()) if siege else None
+        folder = Path(around.enter_context(tempfile.TemporaryDirectory()))
+        disk = around.enter_context(freezable(folder, DISK_MIB)) if siege else None
         stderr = around.enter_context(unread_pipe()) if siege else None
-        folder = around.enter_context(tempfile.TemporaryDirectory())
-        place = Path(folder) if disk is None else disk.folder
+        place = folder if disk is None else disk.folder
         rig = around.enter_context(Rig(place, stderr=stderr))
         while done < runs:
             with contextlib.ExitStack() as crowd:

@@ -15,12 +15,9 @@ import asyncio
 import contextlib
 import fcntl
 import os
-import subprocess
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import cv2
 import httpx
@@ -28,7 +25,6 @@ import numpy as np
 
 from benchmarks.rig import TOKEN
 
-DISK_MB = 128
 LONGEST_S = 1800.0
 """The attackers end by themselves after this."""
 SILENT = 2000
@@ -56,44 +52,6 @@ def unread_pipe() -> Iterator[int]:
     finally:
         os.close(reading)
         os.close(writing)
-
-
-class Disk:
-    """A file system of its own that can be frozen; used with ``with``.
-
-    Raises:
-        subprocess.CalledProcessError: it cannot be mounted here.
-    """
-
-    def __init__(self) -> None:
-        self._around = tempfile.TemporaryDirectory()
-        self.folder = Path(self._around.name) / "disk"
-        self._frozen = False
-
-    def __enter__(self) -> "Disk":
-        image = Path(self._around.name) / "image"
-        with image.open("wb") as file:
-            file.truncate(DISK_MB << 20)
-        self.folder.mkdir()
-        subprocess.run(["mkfs.ext4", "-q", image], check=True)
-        subprocess.run(["mount", "-o", "loop", image, self.folder], check=True)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.thaw()
-        subprocess.run(["umount", "--lazy", self.folder], check=False)
-        self._around.cleanup()
-
-    def freeze(self) -> None:
-        """From now on whoever writes waits."""
-        subprocess.run(["fsfreeze", "--freeze", self.folder], check=True)
-        self._frozen = True
-
-    def thaw(self) -> None:
-        """Writing goes on."""
-        if self._frozen:
-            self._frozen = False
-            subprocess.run(["fsfreeze", "--unfreeze", self.folder], check=True)
 
 
 async def besiege(url: str) -> None:

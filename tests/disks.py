@@ -30,12 +30,12 @@ class Disk:
 
 
 @contextmanager
-def freezable(folder: Path) -> Iterator[Disk]:
-    """An ext4 of 8 MiB on a loop device; skips where none may be mounted."""
+def freezable(folder: Path, mebibytes: int = 8) -> Iterator[Disk]:
+    """An ext4 on a loop device; skips where none may be mounted."""
     image, mounted = folder / "image", folder / "mounted"
     mounted.mkdir()
     with image.open("wb") as file:
-        file.truncate(8 << 20)
+        file.truncate(mebibytes << 20)
     disk = Disk(mounted)
     try:
         _run("mkfs.ext4", "-q", "-m", "0", image)

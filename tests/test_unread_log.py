@@ -14,6 +14,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from app.link.actions import JogJoint
 from app.link.messages import LeaseRequest, StopRequest
 from app.link.session import socket_endpoint
+from app.robot.latch_file import LatchFile
 from benchmarks import estop
 from benchmarks.node_process import Driver
 from benchmarks.observer import FULL_SPEED, STANDSTILL_MS, Observer, tick_now, wait
@@ -93,7 +94,7 @@ def test_a_node_that_runs_by_itself(reader: Reader, tmp_path: Path) -> None:
             wait(lambda: observer.state.mode == "stopped" and observer.stands(), "the stop")
             stood = observer.standstill(pressed, tick_now())
             assert stood.since_fault_ms <= 2 * STANDSTILL_MS
-            wait(latch.exists, "the latch")
+            wait(lambda: LatchFile(latch).load(), "the latch")
 
             def lost() -> int:
                 loop = observer.state.loop
