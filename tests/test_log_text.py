@@ -1,14 +1,12 @@
 """What a request brings stays inside its own line of the log."""
 
 import logging
+import subprocess
 import sys
 from io import StringIO
-from logging.config import dictConfig
-from typing import Any
 
 import pytest
 
-from app.gateway.serve import LOG_CONFIG
 from app.log_text import LineFormatter, printable
 
 
@@ -49,19 +47,17 @@ def test_nothing_that_is_logged_begins_a_line_of_its_own() -> None:
     assert any("ValueError" in line for line in lines)
 
 
-def test_the_servers_log_is_made_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    out = StringIO()
-    monkeypatch.setattr(sys, "stderr", out)
-    config: dict[str, Any] = {
-        "version": 1,
-        "disable_existing_loggers": False,
-        "formatters": LOG_CONFIG["formatters"],
-        "handlers": LOG_CONFIG["handlers"],
-        "loggers": {"test.forging": {"handlers": ["stderr"], "propagate": False, "level": "INFO"}},
-    }
-    dictConfig(config)
-    try:
-        logging.getLogger("test.forging").info("%s", "/a\n\x1b[0m")
-    finally:
-        logging.getLogger("test.forging").handlers.clear()
-    assert out.getvalue().endswith("INFO /a\\n\\x1b[0m\n")
+PROCESS = """
+import logging
+from app.logs import written_apart
+with written_apart():
+    logging.getLogger("forging").info("%s", "/a\\n\\x1b[0m")
+"""
+
+
+def test_the_log_of_our_processes_is_made_so() -> None:
+    ended = subprocess.run(
+        [sys.executable, "-c", PROCESS], capture_output=True, text=True, check=True, timeout=120
+    )
+    assert ended.stderr.endswith("INFO /a\\n\\x1b[0m\n")
+    assert len(ended.stderr.splitlines()) == 1

@@ -1,6 +1,7 @@
 """Who may come in, with real requests."""
 
 import ipaddress
+import logging
 import socket
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from app.errors import NotAllowed, NotSignedIn, RequestError
 from app.gateway.auth import Gatekeeper, Identity
 from app.gateway.origin import is_loopback, same_host
 from app.gateway.page_secret import page_secret
-from app.gateway.serve import LOG_CONFIG
+from app.gateway.serve import LOG_LEVELS
 from app.gateway.throttle import TooManyGuesses
 from app.gateway.tokens import GIVEN, TokenStore, sha256
 from tests.gateway.browser import NAME, SignedIn
@@ -397,7 +398,7 @@ def test_no_secret_reaches_the_log(server: Running, caplog: pytest.LogCaptureFix
         client.get("/api/gestures", headers=BEARER)
         server.operator().close()
     # uvicorn and the clients of this test tell headers at their lower levels.
-    assert LOG_CONFIG["loggers"]["uvicorn"]["level"] == "WARNING"
+    assert LOG_LEVELS["uvicorn"] == logging.WARNING
     ours = [record for record in caplog.records if record.name.startswith("app.")]
     assert any(record.name == "app.gateway.access" for record in ours)
     assert not any(TOKEN in record.getMessage() for record in ours)
