@@ -99,7 +99,7 @@ PROOFS: dict[str, Proof] = {
     "GET /docs": "cookie",
     "GET /openapi.json": "cookie",
     "GET /viser": "cookie",
-    "GET /viser/{path:path}": "cookie",
+    "GET /viser/": "cookie",
     # What a page shows by its address alone.
     "GET /api/gestures/{id}/template.png": "ticket",
     "GET /api/timeline/{id}/picture.jpg": "ticket",
@@ -218,6 +218,8 @@ def check_routes(routes: Iterable[Any]) -> None:
     missing = [key for key in routes_of(routes) if key not in ROUTES and not _is_below_another(key)]
     if missing:
         raise CannotStart(f"app/gateway/roles.py does not say who may use {', '.join(missing)}")
+    if stray := PROOFS.keys() - ROUTES.keys():
+        raise CannotStart(f"app/gateway/roles.py has no row for {', '.join(sorted(stray))}")
 
 
 def check_messages(kinds: Iterable[str]) -> None:

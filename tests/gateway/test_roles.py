@@ -243,7 +243,7 @@ def expected(key: str, who: str, how: str, origin: str, host: str) -> int | None
 
 OPEN_BY_COOKIE = {
     "GET /", "GET /static/{path:path}", "HEAD /static/{path:path}", "GET /docs",
-    "GET /openapi.json", "GET /viser", "GET /viser/{path:path}",
+    "GET /openapi.json", "GET /viser", "GET /viser/",
 }  # fmt: skip
 """The page's own files."""
 OPEN_BY_TICKET = {
