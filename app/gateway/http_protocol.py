@@ -240,6 +240,9 @@ class LimitedHttp(HttpToolsProtocol):
     def on_response_complete(self) -> None:
         """The answer is on its way."""
         unread = self._in_body and not self.pipeline and not self._connection.signed_in
+        # A short rest is read: the client does not know of an end, and would ask on this connection
+        # again.
+        unread = unread and not self._is_short_body()
         super().on_response_complete()
         if self.transport.is_closing():
             return
@@ -252,6 +255,11 @@ class LimitedHttp(HttpToolsProtocol):
             self._connection.deadline = time.monotonic() + most
         elif not self._in_head:
             self._idle()
+
+    def _is_short_body(self) -> bool:
+        """Whether the body that is under way has at most as many bytes as a head may have."""
+        declared = dict(self.headers).get(b"content-length", b"")
+        return declared.isdigit() and int(declared) <= self._settings.max_head_bytes
 
     def _idle(self) -> None:
         # uvicorn itself ends who is signed in after keep_alive_s.

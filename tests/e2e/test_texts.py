@@ -41,7 +41,7 @@ SAME = {
     "title", "stage.age", "glass.nothing", "glass.regionValue", "glass.templateValue",
     "gestures.noDistance", "latency.total", "jog.joint", "jog.pose", "first.teach.tile",
     "readout.joint", "readout.toolValue", "readout.placeValue", "readout.slideValue",
-    "action.linear", "check.anywhere", "first.stepNames.whose", "headings.readout",
+    "account.token", "action.linear", "check.anywhere", "first.stepNames.whose", "headings.readout",
 }  # fmt: skip
 """What reads alike in every language: names, signs and figures."""
 

@@ -149,7 +149,7 @@ def test_read_as_ever_all_comes_and_before_the_end(reader: Reader) -> None:
     for line in (
         r"INFO record 7\n",
         r"printed 7\n",
-        r"by C\nby C\n",
+        r"by C\n(.*\n)?by C\n",
         r"UserWarning: warning 7\n",
         r"WARNING alone 7\n",
         r"a line of x cannot be put together: TypeError\n",
