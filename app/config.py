@@ -93,6 +93,34 @@ class BinariseSettings(_Section):
     max_area: Fraction = Field(default=0.8, description="largest hand, part of the picture")
 
 
+class LandmarkSettings(_Section):
+    """Finding the hand by its landmarks, with MediaPipe's networks."""
+
+    mode: Literal["auto", "on", "off"] = Field(
+        default="auto",
+        description="auto: where the networks are on this machine and the background is not plain; "
+        "on: for every picture, and without the networks the server does not start; off: never, so "
+        "that hands are found by their mask alone",
+    )
+    folder: Path | None = Field(
+        default=None,
+        description="folder that holds the networks; default: the user's own, which farhand models "
+        "add fills, then the installed package mediapipe",
+    )
+    palm: Literal["lite", "full"] = Field(
+        default="full", description="network that finds palms in a live picture"
+    )
+    hand: Literal["lite", "full"] = Field(
+        default="lite", description="network that finds the landmarks in a live picture"
+    )
+    min_palm: Fraction = Field(
+        default=0.5, description="least score of a palm in the whole picture (MediaPipe: 0.5)"
+    )
+    min_presence: Fraction = Field(
+        default=0.5, description="least probability that a region holds a hand (MediaPipe: 0.5)"
+    )
+
+
 class MotionSettings(_Section):
     """The gate that lets only a hand at rest through."""
 
@@ -295,6 +323,7 @@ class PipelineSettings(_Section):
     smooth: SmoothSettings = SmoothSettings()
     normalise: NormaliseSettings = NormaliseSettings()
     binarise: BinariseSettings = BinariseSettings()
+    landmarks: LandmarkSettings = LandmarkSettings()
     motion: MotionSettings = MotionSettings()
     roi: RoiSettings = RoiSettings()
     wrist: WristSettings = WristSettings()
