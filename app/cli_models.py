@@ -71,7 +71,7 @@ def add_models(
     folder = own_folder()
     if wheel is None and not yes:
         typer.confirm(
-            f"Download the wheel of mediapipe (35 MB) with pip, and keep four networks in {folder}?",
+            f"Download the wheel of mediapipe (35 MB) with pip, keep four networks in {folder}?",
             abort=True,
         )
     if wheel is not None:

@@ -5,6 +5,7 @@ fills it), and the package ``mediapipe`` where that is installed, which is not i
 file counts only when its checksum is the known one.
 """
 
+import contextlib
 import functools
 import hashlib
 import os
@@ -152,10 +153,8 @@ def _places(folder: Path | None, model: ModelFile) -> list[Path]:
     places = [own_folder() / model.name]
     if folder is not None:
         places.insert(0, folder / model.name)
-    try:
+    with contextlib.suppress(PackageNotFoundError):
         places.append(Path(str(distribution("mediapipe").locate_file(model.path))))
-    except PackageNotFoundError:
-        pass
     return places
 
 

@@ -1,7 +1,7 @@
 """Palms: where in a picture palms are, by MediaPipe's palm detector.
 
-A single-shot detector (W. Liu et al., "SSD", ECCV 2016): for each of 2,016 anchors a score, a box and
-seven points of the palm. Anchors, decoding and the merging of overlapping boxes are those of
+A single-shot detector (W. Liu et al., "SSD", ECCV 2016): for each of 2,016 anchors a score, a box
+and seven points of the palm. Anchors, decoding and the merging of overlapping boxes are those of
 MediaPipe's published graph ``palm_detection_cpu`` (Apache-2.0).
 """
 
@@ -63,19 +63,18 @@ class PalmDetector:
         cv2.cvtColor(small, code, dst=self._square[top : top + h, left : left + w])
         np.multiply(self._square, np.float32(1 / 255), out=self._input)
         raw, logits = self._network(self._input)
-        scores = 1 / (1 + np.exp(-np.clip(logits[:, 0], -CLIP, CLIP)))
+        scores: F32 = 1 / (1 + np.exp(-np.clip(logits[:, 0], -CLIP, CLIP)))
         sure = np.flatnonzero(scores >= least)
         if not len(sure):
             return []
         boxes, points = self._decode(raw[sure], sure)
-        boxes, points = merge(boxes, points, weights := scores[sure], OVERLAP)
+        merged, sevens = merge(boxes, points, scores[sure], OVERLAP)
         shift, back = np.array([left, top], np.float32), np.float32(1 / scale)
-        del weights
+        corners = (merged[:, :4] - np.tile(shift, 2)) * back
+        sevens = (sevens - shift) * back
         return [
-            PalmDetection(
-                (box[:4] - np.tile(shift, 2)) * back, (seven - shift) * back, float(box[4])
-            )
-            for box, seven in zip(boxes, points, strict=True)
+            PalmDetection(box, seven, float(score))
+            for box, seven, score in zip(corners, sevens, merged[:, 4], strict=True)
         ]
 
     def _decode(self, raw: F32, which: np.ndarray) -> tuple[F32, F32]:

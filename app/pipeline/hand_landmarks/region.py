@@ -1,7 +1,8 @@
 """Region: the turned square of a picture in which a hand is looked for its landmarks.
 
-The constants are those of MediaPipe's published graphs (Apache-2.0): ``palm_detection_detection_to_roi``
-and ``hand_landmark_landmarks_to_roi``. The networks were trained on such regions.
+The constants are those of MediaPipe's published graphs (Apache-2.0),
+``palm_detection_detection_to_roi`` and ``hand_landmark_landmarks_to_roi``. The networks were trained
+on such regions.
 """
 
 import math
@@ -68,7 +69,7 @@ def _moved(x: float, y: float, turn: float, down: float) -> tuple[float, float]:
 
 
 def to_picture(region: Region, size: int) -> F32:
-    """(2, 3) matrix from pixels of a ``size`` x ``size`` look at a region to those of the picture."""
+    """(2, 3) matrix from pixels of a look of ``size`` x ``size`` to those of the picture."""
     scale = region.side / size
     cosine, sine = math.cos(region.turn) * scale, math.sin(region.turn) * scale
     half = size / 2
