@@ -226,6 +226,19 @@ class MatchSettings(_Section):
     min_reach: float = Field(
         default=0.36, ge=0.0, le=2.0, description="a match as near as this is never too far"
     )
+    landmark_max_distance: float = Field(
+        default=0.44,
+        ge=0.0,
+        le=2.0,
+        description="max_distance where hands are compared by their landmarks",
+    )
+    landmark_min_reach: float = Field(
+        default=0.28, ge=0.0, le=2.0, description="min_reach where they are"
+    )
+    either_hand: bool = Field(
+        default=True,
+        description="a gesture taught with one hand is known of the other, too; by landmarks only",
+    )
     min_margin: float = Field(
         default=0.03,
         ge=0.0,

@@ -3,10 +3,9 @@
 import math
 from pathlib import Path
 
-import cv2
 import numpy as np
 
-from app.pipeline.hand_landmarks.region import cut_out, to_picture
+from app.pipeline.hand_landmarks.region import as_seen, to_picture
 from app.pipeline.hand_landmarks.runtime import Network
 from app.pipeline.hand_landmarks.types import POINTS, HandLandmarks, Region
 from app.pipeline.types import F32, U8
@@ -23,19 +22,12 @@ class Landmarker:
 
     def __init__(self, model: Path) -> None:
         self._network = Network(model)
-        self._bgr: U8 = np.zeros((SIZE, SIZE, 3), np.uint8)
-        self._grey: U8 = np.zeros((SIZE, SIZE), np.uint8)
         self._rgb: U8 = np.zeros((SIZE, SIZE, 3), np.uint8)
         self._input: F32 = np.zeros((SIZE, SIZE, 3), np.float32)
 
     def __call__(self, pixels: U8, region: Region) -> HandLandmarks:
         """Look at a region of a (h, w, 3) BGR or (h, w, 1) grey picture."""
-        if pixels.ndim == 3 and pixels.shape[2] == 3:
-            cut_out(pixels, region, self._bgr)
-            cv2.cvtColor(self._bgr, cv2.COLOR_BGR2RGB, dst=self._rgb)
-        else:
-            cut_out(pixels, region, self._grey)
-            cv2.cvtColor(self._grey, cv2.COLOR_GRAY2RGB, dst=self._rgb)
+        as_seen(pixels, region, self._rgb)
         np.multiply(self._rgb, np.float32(1 / 255), out=self._input)
         flat, presence, right, world = self._network(self._input)
         seen = flat.reshape(POINTS, 3)

@@ -10,8 +10,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from app.pipeline.hand_landmarks.region import as_seen, to_picture
 from app.pipeline.hand_landmarks.runtime import Network
-from app.pipeline.hand_landmarks.types import PalmDetection
+from app.pipeline.hand_landmarks.types import PalmDetection, Region
 from app.pipeline.types import F32, U8
 
 SIZE = 192
@@ -22,6 +23,8 @@ CLIP = 100.0
 """Largest score, either way, before the sigmoid."""
 OVERLAP = 0.3
 """Intersection over union from which two boxes are of one palm."""
+SHRINK = 0.75
+"""A picture that is looked at smaller than this is made smaller by area first: no pixel is lost."""
 
 
 def anchors() -> F32:
@@ -40,6 +43,12 @@ def anchors() -> F32:
     return np.concatenate(centres)
 
 
+def whole(pixels: U8, widened: float = 1.0) -> Region:
+    """The square round a picture, ``widened`` times as large as it has to be."""
+    height, width = pixels.shape[:2]
+    return Region(width / 2, height / 2, widened * max(width, height), 0.0)
+
+
 class PalmDetector:
     """(h, w, 3) BGR or (h, w, 1) grey to palms, the surest first."""
 
@@ -49,33 +58,44 @@ class PalmDetector:
         self._square: U8 = np.zeros((SIZE, SIZE, 3), np.uint8)
         self._input: F32 = np.zeros((SIZE, SIZE, 3), np.float32)
 
-    def __call__(self, pixels: U8, least: float) -> list[PalmDetection]:
-        """Find the palms with a score of at least ``least``."""
-        height, width = pixels.shape[:2]
-        scale = SIZE / max(height, width)
-        w, h = max(1, round(width * scale)), max(1, round(height * scale))
-        left, top = (SIZE - w) // 2, (SIZE - h) // 2
-        small = cv2.resize(
-            pixels, (w, h), interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
-        )
-        self._square.fill(0)
-        code = cv2.COLOR_GRAY2RGB if small.ndim == 2 else cv2.COLOR_BGR2RGB
-        cv2.cvtColor(small, code, dst=self._square[top : top + h, left : left + w])
-        np.multiply(self._square, np.float32(1 / 255), out=self._input)
+    def __call__(
+        self, pixels: U8, least: float, where: Region | None = None
+    ) -> list[PalmDetection]:
+        """Find palms.
+
+        Args:
+            pixels: The picture.
+            least: Score from which a palm counts.
+            where: What is looked at; default: all of the picture.
+
+        Returns:
+            In pixels of the picture.
+        """
+        where = where or whole(pixels)
+        self._look(pixels, where)
         raw, logits = self._network(self._input)
-        scores: F32 = 1 / (1 + np.exp(-np.clip(logits[:, 0], -CLIP, CLIP)))
+        scores = (1 / (1 + np.exp(-np.clip(logits[:, 0], -CLIP, CLIP)))).astype(np.float32)
         sure = np.flatnonzero(scores >= least)
         if not len(sure):
             return []
         boxes, points = self._decode(raw[sure], sure)
         merged, sevens = merge(boxes, points, scores[sure], OVERLAP)
-        shift, back = np.array([left, top], np.float32), np.float32(1 / scale)
-        corners = (merged[:, :4] - np.tile(shift, 2)) * back
-        sevens = (sevens - shift) * back
         return [
-            PalmDetection(box, seven, float(score))
-            for box, seven, score in zip(corners, sevens, merged[:, 4], strict=True)
+            PalmDetection(*_back(box, seven, where), float(score))
+            for box, seven, score in zip(merged[:, :4], sevens, merged[:, 4], strict=True)
         ]
+
+    def _look(self, pixels: U8, where: Region) -> None:
+        """Fill the input with a region, RGB, 0 to 1."""
+        scale = SIZE / where.side
+        if scale < SHRINK:
+            height, width = pixels.shape[:2]
+            w, h = max(1, round(width * scale)), max(1, round(height * scale))
+            pixels = np.asarray(cv2.resize(pixels, (w, h), interpolation=cv2.INTER_AREA), np.uint8)
+            across, down = w / width, h / height
+            where = Region(where.x * across, where.y * down, SIZE, where.turn)
+        as_seen(pixels, where, self._square)
+        np.multiply(self._square, np.float32(1 / 255), out=self._input)
 
     def _decode(self, raw: F32, which: np.ndarray) -> tuple[F32, F32]:
         """Boxes and points, pixels of the square: offsets from the anchors' centres."""
@@ -84,6 +104,15 @@ class PalmDetector:
         boxes = np.concatenate([middle - size / 2, middle + size / 2], axis=1)
         points = raw[:, 4:].reshape(len(raw), 7, 2) + centres[:, None]
         return boxes, points
+
+
+def _back(box: F32, points: F32, where: Region) -> tuple[F32, F32]:
+    """A box and points of a look in pixels of the picture; the box stays upright."""
+    matrix = to_picture(where, SIZE)
+    middle = (box[:2] + box[2:]) / 2
+    half = (box[2:] - box[:2]) / 2 * np.float32(where.side / SIZE)
+    there = matrix[:, :2] @ middle + matrix[:, 2]
+    return np.concatenate([there - half, there + half]), points @ matrix[:, :2].T + matrix[:, 2]
 
 
 def merge(boxes: F32, points: F32, scores: F32, overlap: float) -> tuple[F32, F32]:

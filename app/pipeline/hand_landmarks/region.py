@@ -1,8 +1,8 @@
 """Region: the turned square of a picture in which a hand is looked for its landmarks.
 
 The constants are those of MediaPipe's published graphs (Apache-2.0),
-``palm_detection_detection_to_roi`` and ``hand_landmark_landmarks_to_roi``. The networks were trained
-on such regions.
+``palm_detection_detection_to_roi`` and ``hand_landmark_landmarks_to_roi``. The networks were
+trained on such regions.
 """
 
 import math
@@ -82,14 +82,22 @@ def to_picture(region: Region, size: int) -> F32:
     )
 
 
-def cut_out(pixels: U8, region: Region, out: U8) -> None:
-    """Fill ``out``, (s, s, 3) or (s, s), with the region; what lies outside the picture is 0."""
+def as_seen(pixels: U8, region: Region, out: U8) -> None:
+    """Fill ``out``, (s, s, 3) RGB, with a region; what lies outside of the picture is black.
+
+    Args:
+        pixels: (h, w, 3) BGR, or (h, w) or (h, w, 1) grey.
+        region: Of the picture.
+        out: A buffer.
+    """
     size = out.shape[0]
-    cv2.warpAffine(
+    colour = pixels.ndim == 3 and pixels.shape[2] == 3
+    seen = cv2.warpAffine(
         pixels,
         to_picture(region, size),
         (size, size),
-        dst=out,
+        dst=out if colour else None,
         flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
         borderMode=cv2.BORDER_CONSTANT,
     )
+    cv2.cvtColor(seen, cv2.COLOR_BGR2RGB if colour else cv2.COLOR_GRAY2RGB, dst=out)
