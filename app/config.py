@@ -98,9 +98,9 @@ class LandmarkSettings(_Section):
 
     mode: Literal["auto", "on", "off"] = Field(
         default="auto",
-        description="auto: where the networks are on this machine and the background is not plain; "
-        "on: for every picture, and without the networks the server does not start; off: never, so "
-        "that hands are found by their mask alone",
+        description="auto: where the networks are on this machine and binarise.mode is auto, too; "
+        "before a plain background the threshold finds what they do not. on: the same, and without "
+        "the networks nothing starts. off: hands are found by their mask alone",
     )
     folder: Path | None = Field(
         default=None,
@@ -108,7 +108,7 @@ class LandmarkSettings(_Section):
         "add fills, then the installed package mediapipe",
     )
     palm: Literal["lite", "full"] = Field(
-        default="full", description="network that finds palms in a live picture"
+        default="lite", description="network that finds palms in a live picture"
     )
     hand: Literal["lite", "full"] = Field(
         default="lite", description="network that finds the landmarks in a live picture"
@@ -118,6 +118,12 @@ class LandmarkSettings(_Section):
     )
     min_presence: Fraction = Field(
         default=0.5, description="least probability that a region holds a hand (MediaPipe: 0.5)"
+    )
+    working_side: int = Field(
+        default=360,
+        ge=48,
+        le=2160,
+        description="pixels; as decode.working_side, for the pictures that they look at",
     )
 
 
@@ -147,6 +153,18 @@ class MotionSettings(_Section):
     settle_threshold: Fraction = Field(
         default=0.05,
         description="it looks the same when fewer than this part of the hand's pixels mismatch",
+    )
+    hand_speed: float = Field(
+        default=2.0,
+        ge=0.0,
+        le=50.0,
+        description="palm lengths a second; a hand found by landmarks rests when it is slower",
+    )
+    hand_settle: float = Field(
+        default=0.22,
+        ge=0.0,
+        le=2.0,
+        description="in the unit of a match; it looks the same when its landmarks differ by less",
     )
 
 
@@ -301,6 +319,12 @@ class StillSettings(_Section):
     )
     working_side: int = Field(
         default=320, ge=64, le=2160, description="pixels; longer side after scaling down"
+    )
+    landmark_side: int = Field(
+        default=960,
+        ge=64,
+        le=4096,
+        description="pixels; the same of the picture in which landmarks are looked for",
     )
 
 

@@ -13,6 +13,8 @@ from app.config import PipelineSettings
 from app.pipeline.binarise import Binarise
 from app.pipeline.channel import Channel
 from app.pipeline.choose import Choose
+from app.pipeline.hand_landmarks.live import ByLandmarks
+from app.pipeline.hand_landmarks.types import HandLandmarks
 from app.pipeline.mask import LearnedMask, Masked
 from app.pipeline.normalise import Normalise
 from app.pipeline.palm import Palm, PalmFinder
@@ -48,7 +50,8 @@ class FindHand:
 
     Attributes:
         way: How the last mask was made, and why so.
-        looks: How often the network ran for it.
+        looks: How often the mask network ran for it.
+        hand: The landmarks that it was drawn from; None where it was found by its mask.
     """
 
     def __init__(self, settings: PipelineSettings) -> None:
@@ -64,14 +67,28 @@ class FindHand:
         self._mask: U8 = np.empty(0, np.uint8)
         self._two = False
         self._contrast = self._sure = 0.0
+        self._landmarks = ByLandmarks.where_wanted(settings)
         self.way = Way("threshold", "")
         self.looks = 0
+        self.hand: HandLandmarks | None = None
 
     def __call__(self, pixels: U8, watch: Stopwatch, *, held: bool = False) -> Palm:
         """Find the hand in (h, w, 3) BGR or (h, w, 1) grey; ``held``: it holds a gesture."""
         self.looks = 0
+        self.hand = None
+        if self._landmarks is not None:
+            self.hand, small, drawn = self._landmarks(pixels)
+            watch.lap("find")
+            if drawn is not None:
+                self.way = self._landmarks.way
+                return drawn
+            pixels = small
         self.way = self._choose(pixels, held=held)
         watch.lap("choose")
+        if self._landmarks is not None and self.way.mode == "learned":
+            # Where the landmarks see no hand, a mask of what is like skin is none.
+            self.way = self._landmarks.way
+            return self._landmarks.nothing(pixels)
         if self.way.mode == "learned":
             return self._by_network(pixels, watch)
         plane = self._channel(pixels)
@@ -100,6 +117,16 @@ class FindHand:
         self.way = other
         return self._by_network(pixels, watch)
 
+    @property
+    def by_landmarks(self) -> bool:
+        """Whether hands are looked for by their landmarks first."""
+        return self._landmarks is not None
+
+    def reset(self) -> None:
+        """Forget the hand that is followed."""
+        if self._landmarks is not None:
+            self._landmarks.reset()
+
     def _by_network(self, pixels: U8, watch: Stopwatch) -> Palm:
         masked = self._network(pixels)
         self._sure = masked.sure
@@ -122,6 +149,8 @@ class FindHand:
         The network looks at the part round the hand, and at the whole picture every now and then;
         while there are two hands, every time.
         """
+        if self.way.mode == "landmarks":
+            return self._landmarks is not None and self._landmarks.second
         if self.way.mode == "threshold":
             return two_hands(self._mask, palm, self._second_hand)
         assert self._learned is not None
@@ -135,6 +164,8 @@ class FindHand:
     def why_none(self, palm: Palm) -> str | None:
         """Why the piece last found is no hand, in plain words; None when it may be one."""
         limits = self._settings
+        if self.way.mode == "landmarks":
+            return None if palm.found or self._landmarks is None else self._landmarks.why_none()
         if self.way.mode == "learned":
             if not palm.found:
                 return "no hand in the picture"

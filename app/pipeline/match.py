@@ -13,7 +13,7 @@ from app.errors import Invalid
 from app.pipeline.features import Features
 from app.pipeline.hand_landmarks.shape import HandShape, ShapeFeatures
 from app.pipeline.template import HEIGHT, WIDTH
-from app.pipeline.types import F32, U8, Cause, Look, Match
+from app.pipeline.types import F32, U8, Cause, Extraction, Look, Match
 from app.pipeline.views import Views
 
 OWN_REACH = 1.3
@@ -55,6 +55,13 @@ class Gallery:
             raise Invalid(f"templates of shape {self.templates.shape} where {expected} is needed")
         if self.hands and len(self.hands) != len(self.labels):
             raise Invalid(f"{len(self.hands)} hands for {len(self.labels)} templates")
+
+    @classmethod
+    def of(cls, photos: Sequence[tuple[str, Extraction]]) -> Self:
+        """Photographs with their labels; at least one."""
+        templates = np.stack([photo.template for _, photo in photos])
+        hands = tuple(photo.hand for _, photo in photos)
+        return cls(tuple(label for label, _ in photos), templates, hands)
 
     @classmethod
     def empty(cls) -> Self:
@@ -274,6 +281,11 @@ class PcaMatcher:
         if not self.labels:
             return Matched(None, {})
         return self._match_rows(self._features(views))
+
+    def match_photo(self, photo: Extraction) -> Matched:
+        """Match the hand in a photograph: by its landmarks where that can be, else its views."""
+        matched = None if photo.hand is None else self.match_hand(photo.hand)
+        return self(photo.views) if matched is None else matched
 
     def match_hand(self, hand: HandShape) -> Matched | None:
         """Match a hand by its landmarks; None where not every gesture has a sample with some."""

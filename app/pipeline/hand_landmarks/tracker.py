@@ -91,7 +91,7 @@ class HandTracker:
         if not self._is_hand(hand, pixels):
             return Tracked(None, False, True, hand.presence)
         self._region, self._frames = region_of_hand(hand.points), 0
-        others = [palm for palm in palms[1:] if not _is_of(palm, hand)]
+        others = [palm for palm in palms[1:] if not is_of(palm, hand)]
         self._candidate = region_of_palm(others[0]) if others else None
         return Tracked(hand, False, True, None)
 
@@ -99,14 +99,14 @@ class HandTracker:
         """Detector in one frame, landmarks of what it found in the next; True when it ran."""
         if self._candidate is not None:
             other = self._landmarker(pixels, self._candidate)
-            self._second = self._is_hand(other, pixels) and not _same(other, hand)
+            self._second = self._is_hand(other, pixels) and not same_hand(other, hand)
             self._candidate, self._frames = None, 0
             return False
         if self._frames < (SECOND_SEEN if self._second else SECOND_EVERY):
             return False
         self._frames = 0
         palms = self._detector(pixels, self._settings.min_palm)
-        others = [palm for palm in palms if not _is_of(palm, hand)]
+        others = [palm for palm in palms if not is_of(palm, hand)]
         self._candidate = region_of_palm(others[0]) if others else None
         self._second = self._second and bool(others)
         return True
@@ -129,12 +129,14 @@ def palm_middle(hand: HandLandmarks) -> tuple[float, float]:
     return float(middle[0]), float(middle[1])
 
 
-def _is_of(palm: PalmDetection, hand: HandLandmarks) -> bool:
+def is_of(palm: PalmDetection, hand: HandLandmarks) -> bool:
+    """Whether a palm that was found is that of a hand."""
     x, y = palm_middle(hand)
     middle = (palm.box[:2] + palm.box[2:]) / 2
     return math.hypot(float(middle[0]) - x, float(middle[1]) - y) < SAME * hand.region.side
 
 
-def _same(one: HandLandmarks, other: HandLandmarks) -> bool:
+def same_hand(one: HandLandmarks, other: HandLandmarks) -> bool:
+    """Whether both are where one hand is."""
     (x, y), (u, v) = palm_middle(one), palm_middle(other)
     return math.hypot(x - u, y - v) < SAME * other.region.side

@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
 from app.pipeline.types import F32
 
 POINTS = 21
@@ -64,6 +66,12 @@ class HandLandmarks(NamedTuple):
     presence: float
     right: float
     region: Region
+
+    def scaled(self, scale: float) -> "HandLandmarks":
+        """The same hand in a picture so many times as large."""
+        x, y, side, turn = self.region
+        region = Region(x * scale, y * scale, side * scale, turn)
+        return self._replace(points=self.points * np.float32(scale), region=region)
 
     @property
     def palm_length(self) -> float:
