@@ -87,6 +87,7 @@ class Agreement:
         if gesture == self.gesture:
             self._shown_at = now
         elif agreed or now - self._shown_at >= self._settings.release_s:
+            self.pending = None if gesture is None else "agreeing"
             return self._end()
         return GestureEvent(self.gesture, "hold", seq)
 

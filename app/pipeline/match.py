@@ -148,6 +148,10 @@ class PcaMatcher:
             matcher._fit(gallery, progress)
         return matcher
 
+    def used_for(self, hand: HandShape | None) -> "PcaMatcher":
+        """What a hand is matched by, with landmarks or without."""
+        return self if hand is None else self.best
+
     @property
     def best(self) -> "PcaMatcher":
         """What a hand whose landmarks are known is matched by."""

@@ -1,7 +1,7 @@
 """Photo: the hand in one photograph, looked at as often as it takes.
 
 A photograph is enrolled once and asked about for years, so it gets the larger networks and several
-looks: the mean of three has the landmarks of one look's errors taken out of them. On the photographs
+looks, whose mean has fewer errors. On the photographs
 of development one enrolled photo gives 0.89 with the mean and 0.87 with one look.
 """
 
