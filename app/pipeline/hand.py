@@ -13,7 +13,7 @@ from app.config import PipelineSettings
 from app.pipeline.binarise import Binarise
 from app.pipeline.channel import Channel
 from app.pipeline.choose import Choose
-from app.pipeline.hand_landmarks.live import ByLandmarks
+from app.pipeline.hand_landmarks.live import ByLandmarks, agrees
 from app.pipeline.hand_landmarks.types import HandLandmarks
 from app.pipeline.mask import LearnedMask, Masked
 from app.pipeline.normalise import Normalise
@@ -72,23 +72,45 @@ class FindHand:
         self.looks = 0
         self.hand: HandLandmarks | None = None
 
-    def __call__(self, pixels: U8, watch: Stopwatch, *, held: bool = False) -> Palm:
-        """Find the hand in (h, w, 3) BGR or (h, w, 1) grey; ``held``: it holds a gesture."""
+    def __call__(
+        self, pixels: U8, watch: Stopwatch, *, held: bool = False, mask: bool = True
+    ) -> Palm:
+        """Find the hand in a picture, the next of a stream.
+
+        Args:
+            pixels: (h, w, 3) BGR or (h, w, 1) grey.
+            watch: Told how long each stage took.
+            held: The hand holds a gesture.
+            mask: Whether its outline counts. Without, and where its landmarks are seen, it is drawn
+                from these and no mask is made.
+        """
         self.looks = 0
         self.hand = None
-        if self._landmarks is not None:
-            self.hand, small, drawn = self._landmarks(pixels)
-            watch.lap("find")
-            if drawn is not None:
-                self.way = self._landmarks.way
-                return drawn
-            pixels = small
-        self.way = self._choose(pixels, held=held)
-        watch.lap("choose")
-        if self._landmarks is not None and self.way.mode == "learned":
+        if self._landmarks is None:
+            return self._by_mask(pixels, watch, held)
+        self.hand, small, drawn = self._landmarks(pixels)
+        watch.lap("find")
+        if drawn is None:
+            self.way = self._choose(small, held=held)
+            watch.lap("choose")
+            if self.way.mode == "threshold":
+                palm = self._by_mask(small, watch, held, chosen=True)
+                if self.way.mode == "threshold":
+                    return palm
             # Where the landmarks see no hand, a mask of what is like skin is none.
             self.way = self._landmarks.way
-            return self._landmarks.nothing(pixels)
+            return self._landmarks.nothing(small)
+        if mask:
+            palm = self._by_mask(small, watch, held)
+            if self.why_none(palm) is None and agrees(palm, drawn, self.hand, pixels, small):
+                return palm
+        self.way = self._landmarks.way
+        return drawn
+
+    def _by_mask(self, pixels: U8, watch: Stopwatch, held: bool, *, chosen: bool = False) -> Palm:
+        if not chosen:
+            self.way = self._choose(pixels, held=held)
+            watch.lap("choose")
         if self.way.mode == "learned":
             return self._by_network(pixels, watch)
         plane = self._channel(pixels)
@@ -149,8 +171,8 @@ class FindHand:
         The network looks at the part round the hand, and at the whole picture every now and then;
         while there are two hands, every time.
         """
-        if self.way.mode == "landmarks":
-            return self._landmarks is not None and self._landmarks.second
+        if self._landmarks is not None and self.way.mode != "threshold":
+            return self._landmarks.second
         if self.way.mode == "threshold":
             return two_hands(self._mask, palm, self._second_hand)
         assert self._learned is not None

@@ -96,7 +96,9 @@ class Pipeline:
         digest = zlib.crc32(frame.pixels.data)
         watch.lap("decode")
         held = self._agree.gesture is not None
-        palm = self._find_hand(frame.pixels, watch, held=held)
+        # Where every gesture has landmarks the outline is only shown, and drawn from them.
+        by_outline = self.matcher.by_landmarks is None and bool(self.matcher.labels)
+        palm = self._find_hand(frame.pixels, watch, held=held, mask=by_outline)
         hand = self._find_hand.hand
         shape = None if hand is None else HandShape.of([hand])
         motion = self._gate(palm.piece, now)

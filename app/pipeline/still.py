@@ -15,7 +15,7 @@ from app.pipeline.channel import Channel
 from app.pipeline.choose import Choose
 from app.pipeline.formats import ImageInfo, cut_short, read_info
 from app.pipeline.hand import FindHand, Stopwatch, surely_hand
-from app.pipeline.hand_landmarks.live import silhouette, wanted
+from app.pipeline.hand_landmarks.live import agrees, silhouette, wanted
 from app.pipeline.hand_landmarks.photo import PhotoHand, find_in_photo
 from app.pipeline.mask import LearnedMask
 from app.pipeline.normalise import Normalise
@@ -226,13 +226,22 @@ def _find(data: bytes, settings: PipelineSettings) -> _Found:
         _refuse(Finding("no_hand", "no hand found"))
     assert seen is not None
     h, w = pixels.shape[:2]
-    scale = w / fine.shape[1], h / fine.shape[0]
-    return _Found(pixels, width, height, silhouette(seen.hand, (h, w), scale), "landmarks", seen)
+    drawn = silhouette(seen.hand, (h, w), (w / fine.shape[1], h / fine.shape[0]))
+    # The outline is kept, too: for the paper's way, and for galleries without landmarks.
+    by_mask = _mask_finder(settings)
+    palm = by_mask(pixels, Stopwatch())
+    if by_mask.why_none(palm) is None and agrees(palm, drawn, seen.hand, fine, pixels):
+        return _Found(pixels, width, height, palm, by_mask.way.mode, seen)
+    return _Found(pixels, width, height, drawn, "landmarks", seen)
+
+
+def _mask_finder(settings: PipelineSettings) -> FindHand:
+    alone = settings.landmarks.model_copy(update={"mode": "off"})
+    return FindHand(settings.model_copy(update={"landmarks": alone}))
 
 
 def _find_by_mask(pixels: U8, width: int, height: int, settings: PipelineSettings) -> _Found:
-    alone = settings.landmarks.model_copy(update={"mode": "off"})
-    find_hand = FindHand(settings.model_copy(update={"landmarks": alone}))
+    find_hand = _mask_finder(settings)
     palm = find_hand(pixels, Stopwatch())
     reason = find_hand.why_none(palm)
     if reason is not None:
@@ -242,7 +251,8 @@ def _find_by_mask(pixels: U8, width: int, height: int, settings: PipelineSetting
 
 def _everything(found: _Found, settings: PipelineSettings) -> U8:
     """(h, w) mask of all that looks like a hand, wherever in the picture it is."""
-    if found.mode == "landmarks":
+    if found.seen is not None:
+        # Whether there is a second hand was asked of the detector.
         return found.palm.piece
     if found.mode == "learned":
         # The hand's own mask may come from a look at its part of the picture alone.

@@ -15,6 +15,12 @@ from app.pipeline.types import U8, Side, Way
 
 MASK_SIDE = 180
 """Pixels. The silhouette's shorter side has at least so many, as the masks of other ways."""
+COVERED = 0.9
+"""Of the landmarks in the picture that a mask has to hold: 19 of 21; two may lie beside it."""
+NEAR = 0.25
+"""Palm radii within which it holds them."""
+LARGER = 4.0
+"""Times the silhouette's area: so much more a mask may have, with a bare arm."""
 PALM_RADIUS = 0.46
 """Of the palm's inscribed circle, in palm lengths."""
 
@@ -56,7 +62,7 @@ class ByLandmarks:
 
         Returns:
             Its landmarks, in pixels of ``pixels``; the picture at the size of the masks; and the
-            hand's silhouette and palm at that size, None without a hand.
+            hand's silhouette and palm at that size. None and None without a hand.
         """
         self._seen = self._track(pixels)
         hand = self._seen.hand
@@ -66,7 +72,7 @@ class ByLandmarks:
         self.way = Way("landmarks", "its joints are seen")
         height, width = pixels.shape[:2]
         shape = mask_shape(height, width)
-        return hand, pixels, silhouette(hand, shape, (shape[1] / width, shape[0] / height))
+        return hand, shrunk(pixels), silhouette(hand, shape, (shape[1] / width, shape[0] / height))
 
     def nothing(self, pixels: U8) -> Palm:
         """A palm that is none, for a picture of this size."""
@@ -123,6 +129,30 @@ def silhouette(hand: HandLandmarks, shape: tuple[int, int], scale: tuple[float, 
         min(max(round(y * scale[1]), 0), shape[0] - 1),
     )
     return Palm(mask, *at, max(radius, 1.0), cv2.countNonZero(mask), arm_from(hand))
+
+
+def agrees(palm: Palm, drawn: Palm, hand: HandLandmarks | None, pixels: U8, small: U8) -> bool:
+    """Whether a mask of the hand shows what its landmarks do.
+
+    Args:
+        palm: Of the mask, at the size of ``small``.
+        drawn: The silhouette of the landmarks, at the same size.
+        hand: The landmarks, in pixels of ``pixels``.
+        pixels: The picture.
+        small: The same at the size of the masks.
+    """
+    if hand is None or palm.area > LARGER * drawn.area:
+        return False
+    height, width = small.shape[:2]
+    reach = max(1, round(NEAR * drawn.radius))
+    grown = cv2.dilate(palm.piece, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
+    scale = np.array([width / pixels.shape[1], height / pixels.shape[0]], np.float32)
+    at = np.rint(hand.points[:, :2] * scale).astype(int)
+    inside = ((at >= 0) & (at < (width, height))).all(axis=1)
+    if not inside.any():
+        return False
+    covered = grown[at[inside, 1], at[inside, 0]]
+    return float(covered.mean()) >= COVERED
 
 
 def arm_from(hand: HandLandmarks) -> Side:
