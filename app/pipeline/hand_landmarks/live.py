@@ -99,6 +99,10 @@ def wanted(settings: PipelineSettings) -> bool:
     networks = (
         files.find("palm", mine.palm, mine.folder),
         files.find("hand", mine.hand, mine.folder),
+        # For photographs.
+        files.find("palm", "full", mine.folder),
+        files.find("hand", "full", mine.folder),
+        files.find("hand", "lite", mine.folder),
     )
     return all(found.path is not None for found in networks)
 
