@@ -172,7 +172,7 @@ class FindHand:
         while there are two hands, every time.
         """
         if self._landmarks is not None and self.way.mode != "threshold":
-            return self._landmarks.second
+            return self._landmarks.second and self._second_hand > 0
         if self.way.mode == "threshold":
             return two_hands(self._mask, palm, self._second_hand)
         assert self._learned is not None

@@ -293,9 +293,13 @@ class PcaMatcher:
 
     def match_hand(self, hand: HandShape) -> Matched | None:
         """Match a hand by its landmarks; None where not every gesture has a sample with some."""
+        return self.match_features(self._shape_features(hand))
+
+    def match_features(self, features: F32) -> Matched | None:
+        """The same of (v, d) features that :class:`ShapeFeatures` made with these settings."""
         if self.by_landmarks is None:
             return Matched(None, {}) if not self.labels else None
-        return self.by_landmarks._match_rows(self._shape_features(hand))
+        return self.by_landmarks._match_rows(features)
 
     def _match_rows(self, rows: F32) -> Matched:
         return self._judge(self._coordinates(rows - self._mean), self.labels, self._parts)

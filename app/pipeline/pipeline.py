@@ -15,7 +15,7 @@ from app.pipeline.palm import Palm
 from app.pipeline.rest import AtRest
 from app.pipeline.roi import RegionOfInterest
 from app.pipeline.template import MakeTemplate
-from app.pipeline.types import U8, Box, Cause, Circle, FrameResult, GestureEvent, WristCut
+from app.pipeline.types import F32, U8, Box, Cause, Circle, FrameResult, GestureEvent, WristCut
 from app.pipeline.views import Views
 from app.pipeline.wrist import WristCrop
 
@@ -100,9 +100,9 @@ class Pipeline:
         by_outline = self.matcher.by_landmarks is None and bool(self.matcher.labels)
         palm = self._find_hand(frame.pixels, watch, held=held, mask=by_outline)
         hand = self._find_hand.hand
-        shape = None if hand is None else HandShape.of([hand])
+        features = None if hand is None else self._shape_features(HandShape.of([hand]))
         motion = self._gate(palm.piece, now)
-        rest = self._at_rest(motion, hand, shape, now)
+        rest = self._at_rest(motion, hand, features, now)
         watch.lap("motion")
 
         box: Box | None = None
@@ -130,7 +130,8 @@ class Pipeline:
         elif reason is None and box is not None:
             template = self._make_template(cropped, box)
             watch.lap("template")
-            if shape is not None and (by_hand := self.matcher.match_hand(shape)) is not None:
+            by_hand = None if features is None else self.matcher.match_features(features)
+            if by_hand is not None:
                 matched, by_landmarks = by_hand, True
             else:
                 views = self._make_views(whole_or_cut(palm, cropped, self.settings))
@@ -173,13 +174,13 @@ class Pipeline:
         )
 
     def _at_rest(
-        self, motion: Motion, hand: HandLandmarks | None, shape: HandShape | None, now: float
+        self, motion: Motion, hand: HandLandmarks | None, features: F32 | None, now: float
     ) -> AtRest:
         """Whether the hand rests: by its landmarks where they are known, else by its mask."""
-        if hand is None or shape is None:
+        if hand is None or features is None:
             self._stillness.reset()
             return AtRest.of_mask(motion)
-        return AtRest.of_hand(self._stillness(hand, self._shape_features(shape), now))
+        return AtRest.of_hand(self._stillness(hand, features, now))
 
 
 def why_unmatched(matched: Matched, *, at_rest: bool) -> tuple[Cause | None, str | None]:

@@ -197,7 +197,7 @@ def take_shot(data: bytes, settings: PipelineSettings) -> Shot:
     """
     found = _find(data, settings)
     quality = judge(found.pixels, _everything(found, settings), found.palm, settings.quality)
-    if found.seen is not None and found.seen.second:
+    if found.seen is not None and found.seen.second and settings.quality.second_hand:
         _refuse(TWO_HANDS)
     _refuse(quality.problem)
     return Shot(_extract(found, settings), quality)
