@@ -3,10 +3,16 @@
 from typing import Any
 
 from app.gateway.viser_rehearsal import VIEW_ID
+from app.gestures.hand.poses import POSES
 from app.memory import PersonSettings
 
 _GALLERY = {"type": "string", "default": "shared", "description": "id of a gallery"}
 _BURST = {"type": "boolean", "default": False, "description": "frames of a few seconds"}
+_SIGN = {
+    "type": "string",
+    "enum": list(POSES),
+    "description": "the starter sign that the images have to show",
+}
 _IMAGES = {"type": "array", "items": {"type": "string", "format": "binary"}}
 ENROL_BODY: dict[str, Any] = {
     "required": True,
@@ -21,6 +27,7 @@ ENROL_BODY: dict[str, Any] = {
                     "active": {"type": "boolean", "default": True},
                     "gallery": _GALLERY,
                     "burst": _BURST,
+                    "sign": _SIGN,
                     "images": _IMAGES,
                 },
             }
@@ -34,7 +41,7 @@ SAMPLES_BODY: dict[str, Any] = {
             "schema": {
                 "type": "object",
                 "required": ["images"],
-                "properties": {"burst": _BURST, "images": _IMAGES},
+                "properties": {"burst": _BURST, "sign": _SIGN, "images": _IMAGES},
             }
         }
     },
@@ -53,6 +60,7 @@ CHECK_BODY: dict[str, Any] = {
                     "gesture": {"type": "string", "description": "id, to check more samples of it"},
                     "gallery": _GALLERY,
                     "burst": _BURST,
+                    "sign": _SIGN,
                     "images": _IMAGES,
                 },
             }

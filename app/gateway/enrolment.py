@@ -6,12 +6,14 @@ take turns, and one whose client is gone ends after the image that is under way.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from app.config import PipelineSettings
 from app.errors import ImageRefused, Invalid
+from app.gateway.signs import PROBLEM, Difference, difference
 from app.gestures import Gesture
 from app.pipeline import pack_template, unpack_template
 from app.pipeline.burst import Look, choose, look_at, see
@@ -34,6 +36,8 @@ class Judged:
 
     Attributes:
         looks: One an image.
+        signs: For each, how the hand differs from the sign that was asked for; None where it does
+            not, where no sign was asked for, and where no fingers were seen.
         kept: Indices of those to enrol.
         left_out: How many were left out for each reason.
     """
@@ -41,6 +45,7 @@ class Judged:
     looks: tuple[Look, ...]
     kept: tuple[int, ...]
     left_out: dict[str, int]
+    signs: tuple[Difference | None, ...] = ()
 
     @property
     def templates(self) -> list[bytes]:
@@ -65,8 +70,10 @@ class Judged:
                 "problem": None if look.problem is None else look.problem.code,
                 "reason": None if look.problem is None else look.problem.message,
                 "advice": _findings(look.advice),
+                "seen": look.seen,
+                "sign": None if sign is None else sign.as_json(),
             }
-            for number, look in enumerate(self.looks, start=1)
+            for number, (look, sign) in enumerate(zip_longest(self.looks, self.signs), start=1)
         ]
 
     def burst_json(self) -> dict[str, Any]:
@@ -78,8 +85,16 @@ class Judged:
         }
 
 
-async def judge(hub: "Hub", images: Sequence[bytes], *, burst: bool) -> Judged:
+async def judge(
+    hub: "Hub", images: Sequence[bytes], *, burst: bool, sign: str | None = None
+) -> Judged:
     """Judge the images of an upload, none of which stops the others.
+
+    Args:
+        hub: What the routes share.
+        images: Files.
+        burst: They are the frames of a few seconds.
+        sign: The starter sign that they have to show.
 
     Raises:
         Invalid: no image.
@@ -88,13 +103,28 @@ async def judge(hub: "Hub", images: Sequence[bytes], *, burst: bool) -> Judged:
         raise Invalid("at least one image is needed in 'images'", field="images")
     settings = hub.settings.pipeline
     looks = [await hub.pictures.run(look_at, image, settings) for image in images]
+    signs = tuple(_unlike(look, sign) for look in looks)
+    looks = [_marked(*pair) for pair in zip(looks, signs, strict=True)]
     if burst:
         chosen = await hub.pictures.run(choose, looks, settings)
-        return Judged(chosen.looks, chosen.kept, chosen.left_out)
-    return _all_good(looks)
+        return Judged(chosen.looks, chosen.kept, chosen.left_out, signs)
+    return _all_good(looks, signs)
 
 
-async def judge_for_enrolment(hub: "Hub", images: Sequence[bytes], *, burst: bool) -> Judged:
+def _unlike(look: Look, sign: str | None) -> Difference | None:
+    """How what an image shows differs from the sign asked for."""
+    if sign is None or look.hand is None or look.template is None:
+        return None
+    return difference(look.hand, sign)
+
+
+def _marked(look: Look, unlike: Difference | None) -> Look:
+    return look if unlike is None else look._replace(template=None, problem=unlike.finding)
+
+
+async def judge_for_enrolment(
+    hub: "Hub", images: Sequence[bytes], *, burst: bool, sign: str | None = None
+) -> Judged:
     """The same, where an image that is refused refuses all, but for a burst.
 
     Raises:
@@ -114,8 +144,18 @@ async def judge_for_enrolment(hub: "Hub", images: Sequence[bytes], *, burst: boo
                 if len(images) > 1:
                     error.message = f"image {number}: {error.message}"
                 raise
+            unlike = _unlike(looks[-1], sign)
+            if unlike is not None:
+                words = unlike.finding.message
+                raise ImageRefused(
+                    words if len(images) == 1 else f"image {number}: {words}",
+                    problem=PROBLEM,
+                    sign=unlike.as_json(),
+                    seen=looks[-1].seen,
+                    image=number,
+                )
         return _all_good(looks)
-    judged = await judge(hub, images, burst=True)
+    judged = await judge(hub, images, burst=True, sign=sign)
     if not judged.kept:
         counts = ", ".join(f"{count} {_words(code)}" for code, count in judged.left_out.items())
         raise ImageRefused(
@@ -126,19 +166,20 @@ async def judge_for_enrolment(hub: "Hub", images: Sequence[bytes], *, burst: boo
     return judged
 
 
-def _all_good(looks: Sequence[Look]) -> Judged:
+def _all_good(looks: Sequence[Look], signs: tuple[Difference | None, ...] = ()) -> Judged:
     kept = tuple(number for number, look in enumerate(looks) if look.problem is None)
     left_out: dict[str, int] = {}
     for look in looks:
         if look.problem is not None:
             left_out[look.problem.code] = left_out.get(look.problem.code, 0) + 1
-    return Judged(tuple(looks), kept, left_out)
+    return Judged(tuple(looks), kept, left_out, signs)
 
 
 def _words(code: str) -> str:
     return {
         "another_gesture": "without a sign that most of them show",
         "no_hand": "without a hand",
+        PROBLEM: "of another sign",
         "no_wrist": "without a wrist",
         "two_hands": "with two hands",
     }.get(code, code.replace("_", " "))

@@ -21,8 +21,9 @@ from app.gateway.enrolment import (
 from app.gateway.errors import BAD_BODY
 from app.gateway.gallery import Enrolled
 from app.gateway.json_bodies import parse_action, parse_json
+from app.gateway.signs import known_sign
 from app.gateway.undo_offer import UndoOffer
-from app.gateway.uploads import read_enrolment, read_image
+from app.gateway.uploads import Upload, read_enrolment, read_image
 from app.gateway.work_pool import LONG_CPU_S
 from app.gestures import Gesture, template_png
 from app.gestures.records import SHARED, clean_name
@@ -97,7 +98,7 @@ async def create_gesture(request: Request, response: Response) -> dict[str, Any]
 
 
 async def _create(hub: "Hub", request: Request, response: Response) -> dict[str, Any]:
-    known = {"name", "action", "active", "gallery"}
+    known = {"name", "action", "active", "gallery", "sign"}
     upload = await read_enrolment(request, hub.settings.gateway, known)
     for field in ("name", "action"):
         if field not in upload.fields:
@@ -105,11 +106,11 @@ async def _create(hub: "Hub", request: Request, response: Response) -> dict[str,
     active = upload.flag("active", True)
     name = clean_name(upload.fields["name"])
     action = parse_action(parse_json(upload.fields["action"], "action"))
-    gallery = upload.gallery
+    gallery, sign = upload.gallery, sign_of(upload)
     await hub.database(hub.store.galleries.get, gallery)
 
     async def look() -> tuple[Judged, list[dict[str, Any]]]:
-        judged = await judge_for_enrolment(hub, upload.images, burst=upload.burst)
+        judged = await judge_for_enrolment(hub, upload.images, burst=upload.burst, sign=sign)
         return judged, await confusions_of(hub, gallery, name, judged.templates)
 
     judged, confusions = await while_connected(request, look())
@@ -129,6 +130,15 @@ async def _create(hub: "Hub", request: Request, response: Response) -> dict[str,
     offer.to(response)
     response.headers["Location"] = f"/api/gestures/{gesture.id}"
     return _enrolled_json(gesture, judged, upload.burst, confusions)
+
+
+def sign_of(upload: Upload) -> str | None:
+    """The starter sign that an upload has to show, if it is to show one.
+
+    Raises:
+        Invalid: there is no such sign.
+    """
+    return known_sign(upload.fields["sign"]) if "sign" in upload.fields else None
 
 
 async def confusions_of(
@@ -190,7 +200,7 @@ async def check_gesture(request: Request) -> dict[str, Any]:
 
 
 async def _check(hub: "Hub", request: Request) -> dict[str, Any]:
-    known = {"name", "action", "active", "gesture", "gallery"}
+    known = {"name", "action", "active", "gesture", "gallery", "sign"}
     upload = await read_enrolment(request, hub.settings.gateway, known)
     upload.flag("active", True)
     name, besides, samples, gallery = "the new gesture", None, [], upload.gallery
@@ -204,9 +214,10 @@ async def _check(hub: "Hub", request: Request) -> dict[str, Any]:
         name = clean_name(upload.fields["name"])
     if "action" in upload.fields:
         parse_action(parse_json(upload.fields["action"], "action"))
+    sign = sign_of(upload)
 
     async def look() -> tuple[Judged, list[dict[str, Any]]]:
-        judged = await judge(hub, upload.images, burst=upload.burst)
+        judged = await judge(hub, upload.images, burst=upload.burst, sign=sign)
         if not judged.kept:
             return judged, []
         templates = samples + judged.templates
@@ -299,10 +310,11 @@ async def _add(
     hub: "Hub", request: Request, response: Response, id: str, replace: bool
 ) -> dict[str, Any]:
     before = await hub.database(hub.store.get, id)
-    upload = await read_enrolment(request, hub.settings.gateway, set())
+    upload = await read_enrolment(request, hub.settings.gateway, {"sign"})
+    sign = sign_of(upload)
 
     async def look() -> tuple[Judged, list[dict[str, Any]]]:
-        judged = await judge_for_enrolment(hub, upload.images, burst=upload.burst)
+        judged = await judge_for_enrolment(hub, upload.images, burst=upload.burst, sign=sign)
         kept = [] if replace else [sample.template for sample in before.samples]
         templates = kept + judged.templates
         return judged, await confusions_of(hub, before.gallery, before.name, templates, id)
@@ -354,7 +366,13 @@ async def _recognise(hub: "Hub", image: bytes, enrolled: Enrolled) -> dict[str, 
     except Unreadable:
         raise
     except ImageRefused as error:
-        return {"match": None, "reason": error.message, "roi": None, "distances": {}}
+        return {
+            "match": None,
+            "reason": error.message,
+            "roi": None,
+            "distances": {},
+            "seen": error.detail.get("seen"),
+        }
     matched = await hub.learners(enrolled.matcher.match_photo, extraction)
     match = matched.match
     found = None
@@ -366,6 +384,7 @@ async def _recognise(hub: "Hub", image: bytes, enrolled: Enrolled) -> dict[str, 
         "roi": list(extraction.roi),
         "distances": matched.distances,
         "threshold": enrolled.matcher.used_for(extraction.hand).max_distance,
+        "seen": None if extraction.seen is None else extraction.seen.as_json(),
     }
 
 

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -36,10 +36,12 @@ class Look(NamedTuple):
 
     Attributes:
         template: (80, 60), or None when the image is refused.
-        hand: Its landmarks; None where they were not found.
         mask: (120, 160) of the hand with its arm, for seeing it move.
         problem: Why it is refused.
         advice: What would have been better.
+        hand: Its landmarks; None where they were not found.
+        seen: What was found of the hand, as :meth:`SeenHand.as_json
+            <app.pipeline.seen.SeenHand.as_json>` has it; None when it is no picture.
     """
 
     template: U8 | None
@@ -47,6 +49,7 @@ class Look(NamedTuple):
     problem: Finding | None
     advice: tuple[Finding, ...] = ()
     hand: HandShape | None = None
+    seen: dict[str, Any] | None = None
 
 
 def look_at(image: bytes, settings: PipelineSettings) -> Look:
@@ -55,7 +58,7 @@ def look_at(image: bytes, settings: PipelineSettings) -> Look:
         return see(image, settings)
     except (ImageRefused, TooLarge) as error:
         code = error.detail.get("problem", "unreadable")
-        return Look(None, None, Finding(str(code), error.message))
+        return Look(None, None, Finding(str(code), error.message), seen=error.detail.get("seen"))
 
 
 def see(image: bytes, settings: PipelineSettings) -> Look:
@@ -68,7 +71,8 @@ def see(image: bytes, settings: PipelineSettings) -> Look:
     mask = cv2.resize(shot.extraction.mask, _MASK, interpolation=cv2.INTER_NEAREST)
     found = shot.extraction
     shown = np.asarray(mask, np.uint8)
-    return Look(found.template, shown, None, shot.quality.advice, found.hand)
+    seen = None if found.seen is None else found.seen.as_json()
+    return Look(found.template, shown, None, shot.quality.advice, found.hand, seen)
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from app.pipeline.palm import Palm
 from app.pipeline.pipeline import scale_box, scale_cut, whole_or_cut
 from app.pipeline.quality import TWO_HANDS, Finding, Quality, judge, why_cut_off
 from app.pipeline.roi import RegionOfInterest
+from app.pipeline.seen import SeenHand, seen_by_landmarks
 from app.pipeline.smooth import Smooth
 from app.pipeline.template import MakeTemplate
 from app.pipeline.types import U8, Extraction
@@ -33,6 +34,16 @@ BAND = 256
 """Rows of a PNG or WebP that are brought to 8 bits without transparency at a time."""
 MIN_SIDE = 32
 """Pixels. A smaller photograph does not fill a template of 60x80 with anything of its own."""
+SAME_HAND = 0.3
+"""Of the smaller one of two masks: with less in common they are of different things."""
+SURELY = 0.8
+"""Presence from which the landmarks are right, whatever else is like a hand to the mask's
+network."""
+UNCLEAR = Finding(
+    "unclear",
+    "it is not clear which thing in the picture is the hand: show one hand, and nothing else that "
+    "is like one",
+)
 
 
 class Shot(NamedTuple):
@@ -179,11 +190,12 @@ def extract_template(data: bytes, settings: PipelineSettings, *, whole: bool = T
     Raises:
         TooLarge: too many bytes.
         Unreadable: no picture.
-        ImageRefused: no usable hand in it, with the reason in plain words.
+        ImageRefused: no usable hand in it, with the reason in plain words; ``detail`` as in
+            :func:`take_shot`.
     """
     found = _find(data, settings)
     if whole:
-        _refuse(why_cut_off(found.palm))
+        _refuse(why_cut_off(found.palm), found.shown)
     return _extract(found, settings)
 
 
@@ -193,18 +205,25 @@ def take_shot(data: bytes, settings: PipelineSettings) -> Shot:
     Raises:
         TooLarge: too many bytes.
         ImageRefused: no picture, no hand in it, or one that should not be enrolled: cut off, too
-            small, blurred, without a wrist, or not alone. ``detail["problem"]`` is a word for it.
+            small, blurred, without a wrist, not alone, or not clearly the hand.
+            ``detail["problem"]`` is a word for it, and ``detail["seen"]`` what was found of it, as
+            :meth:`SeenHand.as_json` has it; no picture has neither.
     """
     found = _find(data, settings)
+    if found.elsewhere:
+        _refuse(UNCLEAR, found.shown)
     quality = judge(found.pixels, _everything(found, settings), found.palm, settings.quality)
     if found.seen is not None and found.seen.second and settings.quality.second_hand:
-        _refuse(TWO_HANDS)
-    _refuse(quality.problem)
+        _refuse(TWO_HANDS, found.shown)
+    _refuse(quality.problem, found.shown)
     return Shot(_extract(found, settings), quality)
 
 
 class _Found(NamedTuple):
-    """The hand in a photograph, before the arm is cut off; ``width`` x ``height`` is the photo."""
+    """The hand in a photograph, before the arm is cut off; ``width`` x ``height`` is the photo.
+
+    ``elsewhere``: the landmarks are hardly sure, and the mask's network is sure of something else.
+    """
 
     pixels: U8
     width: int
@@ -212,6 +231,8 @@ class _Found(NamedTuple):
     palm: Palm
     mode: str
     seen: PhotoHand | None
+    shown: SeenHand
+    elsewhere: bool = False
 
 
 def _find(data: bytes, settings: PipelineSettings) -> _Found:
@@ -222,17 +243,40 @@ def _find(data: bytes, settings: PipelineSettings) -> _Found:
     seen = find_in_photo(fine, settings.landmarks)
     if seen is None:
         if Choose(settings.binarise)(pixels).mode == "threshold":
-            return _find_by_mask(pixels, width, height, settings)
-        _refuse(Finding("no_hand", "no hand found"))
+            found = _find_by_mask(pixels, width, height, settings)
+            if found.mode == "threshold" and _network_sees(found, settings):
+                return found
+        _refuse(Finding("no_hand", "no hand found"), SeenHand((width, height)))
     assert seen is not None
     h, w = pixels.shape[:2]
     drawn = silhouette(seen.hand, (h, w), (w / fine.shape[1], h / fine.shape[0]))
+    scale = width / fine.shape[1], height / fine.shape[0]
     # The outline is kept, too: for the paper's way, and for galleries without landmarks.
     by_mask = _mask_finder(settings)
     palm = by_mask(pixels, Stopwatch())
-    if by_mask.why_none(palm) is None and agrees(palm, drawn, seen.hand, fine, pixels):
-        return _Found(pixels, width, height, palm, by_mask.way.mode, seen)
-    return _Found(pixels, width, height, drawn, "landmarks", seen)
+    any_mask = by_mask.why_none(palm) is None
+    if any_mask and agrees(palm, drawn, seen.hand, fine, pixels):
+        shown = seen_by_landmarks(seen, scale, (width, height), True)
+        return _Found(pixels, width, height, palm, by_mask.way.mode, seen, shown)
+    shown = seen_by_landmarks(seen, scale, (width, height), False if any_mask else None)
+    elsewhere = any_mask and seen.hand.presence < SURELY and _in_common(palm, drawn) < SAME_HAND
+    return _Found(pixels, width, height, drawn, "landmarks", seen, shown, elsewhere)
+
+
+def _in_common(one: Palm, other: Palm) -> float:
+    """Pixels that two masks share, in parts of the smaller one."""
+    both = cv2.countNonZero(cv2.bitwise_and(one.piece, other.piece))
+    return both / max(min(one.area, other.area), 1)
+
+
+def _network_sees(found: _Found, settings: PipelineSettings) -> bool:
+    """Whether the mask's network takes for a hand what the threshold has found."""
+    masked = LearnedMask()(found.pixels)
+    if masked.sure < settings.binarise.min_sure:
+        return False
+    both = cv2.countNonZero(cv2.bitwise_and(found.palm.piece, masked.mask))
+    least = min(found.palm.area, cv2.countNonZero(masked.mask))
+    return both >= SAME_HAND * max(least, 1)
 
 
 def _mask_finder(settings: PipelineSettings) -> FindHand:
@@ -244,9 +288,11 @@ def _find_by_mask(pixels: U8, width: int, height: int, settings: PipelineSetting
     find_hand = _mask_finder(settings)
     palm = find_hand(pixels, Stopwatch())
     reason = find_hand.why_none(palm)
+    shown = SeenHand((width, height))
     if reason is not None:
-        _refuse(Finding("no_hand", reason.replace("no hand in the picture", "no hand found", 1)))
-    return _Found(pixels, width, height, palm, find_hand.way.mode, None)
+        words = reason.replace("no hand in the picture", "no hand found", 1)
+        _refuse(Finding("no_hand", words), shown)
+    return _Found(pixels, width, height, palm, find_hand.way.mode, None, shown)
 
 
 def _everything(found: _Found, settings: PipelineSettings) -> U8:
@@ -265,9 +311,9 @@ def _everything(found: _Found, settings: PipelineSettings) -> U8:
     return Binarise(settings.binarise)(normalised).mask
 
 
-def _refuse(problem: Finding | None) -> None:
+def _refuse(problem: Finding | None, shown: SeenHand) -> None:
     if problem is not None:
-        raise ImageRefused(problem.message, problem=problem.code)
+        raise ImageRefused(problem.message, problem=problem.code, seen=shown.as_json())
 
 
 def _extract(found: _Found, settings: PipelineSettings) -> Extraction:
@@ -275,7 +321,8 @@ def _extract(found: _Found, settings: PipelineSettings) -> Extraction:
     hand, cut = WristCrop(settings.wrist)(palm)
     box = RegionOfInterest(settings.roi)(hand)
     if box is None:
-        raise ImageRefused("no hand found: nothing is left above the wrist", problem="no_hand")
+        _refuse(Finding("no_hand", "no hand found: nothing is left above the wrist"), found.shown)
+    assert box is not None
     scale_x, scale_y = width / palm.piece.shape[1], height / palm.piece.shape[0]
     roi = scale_box(box, scale_x, scale_y)
     assert roi is not None
@@ -288,4 +335,5 @@ def _extract(found: _Found, settings: PipelineSettings) -> Extraction:
         width=width,
         height=height,
         hand=None if found.seen is None else found.seen.shape,
+        seen=found.shown._replace(region=roi),
     )

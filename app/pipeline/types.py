@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from app.pipeline.hand_landmarks.shape import HandShape
     from app.pipeline.hand_landmarks.types import HandLandmarks
+    from app.pipeline.seen import SeenHand
 
 U8 = NDArray[np.uint8]
 F32 = NDArray[np.float32]
@@ -203,6 +204,7 @@ class Extraction:
         width: Of the photograph, pixels.
         height: Of the photograph, pixels.
         hand: Its landmarks without place and size; None where they were not found.
+        seen: What was found of the hand, in pixels of the photograph.
     """
 
     mask: U8
@@ -213,3 +215,4 @@ class Extraction:
     width: int
     height: int
     hand: "HandShape | None" = None
+    seen: "SeenHand | None" = None

@@ -121,7 +121,7 @@ const starting = new Starting({
         takeControl: () => control.take(),
         disarm: () => link.send("disarm"),
         take: () => (stills ||= new Stills()).take(video),
-        check: (pictures) => api.checkGesture(pictures, store.state.gallery),
+        check: (pictures, sign) => api.checkGesture(pictures, store.state.gallery, { sign }),
         save: (gesture, pictures) => api.replaceSamples(gesture.id, pictures),
         told: (text) => notices.show(text, { kind: "good", name: "first" }),
     },

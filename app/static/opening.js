@@ -4,6 +4,7 @@ import { grabStill } from "./core/jpeg.js";
 import { preflight } from "./core/preflight.js";
 import { forget } from "./core/sign-in.js";
 import { texts } from "./texts/texts.js";
+import { showsHand } from "./ui/page.js";
 import { preflightContent } from "./ui/preflight.js";
 import { askContent } from "./ui/sheets.js";
 import { describeError } from "./ui/words.js";
@@ -26,7 +27,7 @@ export class Opening {
             store,
             video,
             grab: () => grabStill(video),
-            recognise: (picture) => api.recognise(picture, store.state.gallery),
+            look: (picture, known) => api.checkGesture([picture], store.state.gallery, known),
             templateUrl: api.templateUrl,
             act: {
                 create: (...gesture) => api.createGesture(...gesture, store.state.gallery),
@@ -40,14 +41,28 @@ export class Opening {
                 forgetPath: (view) => api.hideDryRun(this.robotId(), view).catch(() => {}),
             },
             view3d: this.views.view3d,
-            done: async (text, changes) => {
+            done: async (text, changes, taught = null) => {
                 this.sheets.close();
                 this.galleries.loadGestures();
+                if (taught && showsHand(store.state)) await this.tryNow(taught);
                 (await this.#undoing()).did(text, changes);
             },
         });
         const title = gesture ? texts.teach.editTitle(gesture.name) : texts.teach.title;
         this.sheets.show("teach", title, content, { onclose: close, focus });
+    }
+
+    /** See whether a gesture that was just taught is known. */
+    async tryNow(gesture) {
+        const { tryContent } = await import("./ui/try-now.js");
+        const { content, focus, close } = tryContent({
+            gesture,
+            store: this.store,
+            video: this.video,
+            addPhoto: () => this.teach(gesture),
+            done: () => this.sheets.close(),
+        });
+        this.sheets.show("try", texts.tryNow.title(gesture.name), content, { onclose: close, focus });
     }
 
     /** Change the gesture with this id, if it is still there. */

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 import simplejpeg
 
+from app.config import PipelineSettings
+from app.pipeline.hand_landmarks.live import wanted
 from tests.gateway.running import Running
 
 Hand = Callable[..., bytes]
@@ -43,7 +45,9 @@ def test_a_bad_shot_is_refused_with_its_reason(lasting: Running, hand: Hand) -> 
     error = enrol(lasting, "wave", hand("up"), blurred(hand("up"))).json()["error"]
     assert error["code"] == "image_refused"
     assert error["message"].startswith("image 2: the picture is blurred")
+    seen = error["detail"].pop("seen")
     assert error["detail"] == {"problem": "blurred", "image": 2}
+    assert seen["size"] == [640, 480]
     assert names(lasting) == before
     # Asking what a blurred picture shows is not refused.
     answer = lasting.http.post("/api/recognise", content=blurred(hand("up"))).json()
@@ -127,9 +131,10 @@ def test_an_inactive_gesture_is_listed_and_not_matched_until_it_is_active(
 def test_enrolling_says_what_may_be_confused(server: Running, hand: Hand) -> None:
     body = enrol(server, "wave", hand("left"), active="false").json()
     assert body["confusions"][0]["gesture"] == "left"
-    assert body["images"] == [
-        {"image": 1, "accepted": True, "problem": None, "reason": None, "advice": []}
-    ]
+    (image,) = body["images"]
+    assert image.pop("seen")["size"] == [640, 480]
+    expected = {"image": 1, "accepted": True, "problem": None, "reason": None, "advice": []}
+    assert image == {**expected, "sign": None}
     matrix = server.http.get("/api/gestures/confusions").json()
     listed = [gesture["name"] for gesture in matrix["gestures"]]
     assert listed == names(server)
@@ -187,3 +192,66 @@ def test_only_a_burst_may_be_large(server: Running, hand: Hand) -> None:
     assert server.http.post(path, files=five * 4, data={"burst": "true"}).status_code == 413
     many = files((hand("up"),) * 51)
     assert server.http.post(path, files=many).status_code == 422
+
+
+SEEN = {"size", "landmarks", "handedness", "fingers", "mask_agrees", "region"}
+needs_landmarks = pytest.mark.skipif(
+    not wanted(PipelineSettings()), reason="needs the networks for hand landmarks"
+)
+
+
+@needs_landmarks
+def test_what_was_seen_of_each_image_is_said(lasting: Running, hand: Hand) -> None:
+    body = check(lasting, hand("up"), blurred(hand("up")), hand(None), b"nothing").json()
+    good, bad, empty, broken = (image["seen"] for image in body["images"])
+    recognised = lasting.http.post("/api/recognise", content=hand("up")).json()
+    for seen in (good, bad, recognised["seen"]):
+        assert set(seen) == SEEN
+        assert seen["size"] == [640, 480]
+        points = np.array(seen["landmarks"])
+        assert points.shape == (21, 2)
+        # The drawn hand's finger tip is above its wrist, in the middle of the picture.
+        assert np.abs(points.mean(axis=0) - (320, 240)).max() < 100
+        assert points[8, 1] < points[0, 1]
+        assert seen["handedness"]["hand"] in ("left", "right", None)
+        x, y, width, height = seen["region"]
+        assert 0 <= x < x + width <= 640 and 0 <= y < y + height <= 480
+        assert len(json.dumps(seen)) < 1000
+    assert good["fingers"]["index"] is True
+    assert good["fingers"]["ring"] is False
+    assert good["mask_agrees"] is True
+    nothing = dict.fromkeys(SEEN - {"size"}) | {"size": [640, 480]}
+    assert empty == nothing
+    assert broken is None
+    none = lasting.http.post("/api/recognise", content=hand(None)).json()
+    assert (none["match"], none["seen"]) == (None, nothing)
+
+
+@needs_landmarks
+def test_another_sign_than_the_one_asked_for_is_said_and_refused(
+    lasting: Running, hand: Hand
+) -> None:
+    body = check(lasting, hand("up"), hand("forward"), hand("close"), sign="up").json()
+    assert [image["accepted"] for image in body["images"]] == [True, False, False]
+    assert body["left_out"] == {"not_the_sign": 2}
+    fits, two, fist = (image["sign"] for image in body["images"])
+    assert fits is None
+    asked = {"seen": 2, "asked": 1, "stretch": [], "bend": ["middle"]}
+    assert two == {"code": "count", **asked}
+    assert body["images"][1]["reason"] == "that is two fingers: one finger is asked"
+    assert fist["code"] == "palm_only"
+    # Nothing is asked, nothing is compared.
+    plain = check(lasting, hand("forward")).json()["images"][0]
+    assert (plain["accepted"], plain["sign"]) == (True, None)
+
+    before = names(lasting)
+    error = enrol(lasting, "wave", hand("up"), hand("forward"), sign="up").json()["error"]
+    assert (error["code"], error["detail"]["image"]) == ("image_refused", 2)
+    assert error["detail"]["problem"] == "not_the_sign"
+    assert error["detail"]["sign"] == two
+    error = enrol(lasting, "wave", hand("forward"), sign="up", burst="true").json()["error"]
+    assert error["detail"]["left_out"] == {"not_the_sign": 1}
+    assert error["message"].endswith("1 of another sign")
+    wrong = check(lasting, hand("up"), sign="dance")
+    assert (wrong.status_code, wrong.json()["error"]["detail"]) == (422, {"field": "sign"})
+    assert names(lasting) == before

@@ -7,6 +7,9 @@ open it like a pair of pliers, the open hand stops.
 
 from app.gestures.hand.pose import Finger, HandPose, Thumb
 
+HALF_BENT = 0.8
+"""Rad at two joints together: a finger that is bent more is not stretched."""
+
 
 def _folded(spread: float = 0.0) -> Finger:
     """Bent into the palm."""
@@ -59,3 +62,9 @@ ALSO: dict[str, tuple[HandPose, ...]] = {
     ),
 }
 """Other ways to show a gesture that people use; to stop must work however the hand is opened."""
+
+
+def stretched(pose: HandPose) -> tuple[bool, ...]:
+    """Which fingers of a pose are stretched, thumb first: what tells one sign from another."""
+    thumb = pose.thumb.mcp + pose.thumb.ip < HALF_BENT
+    return thumb, *(finger.pip + finger.dip < HALF_BENT for finger in pose.fingers)

@@ -117,9 +117,16 @@ export const api = Object.freeze({
             timeoutMs: 35000,
         }),
     hideDryRun: (robot, view) => request("DELETE", `api/robots/${id(robot)}/dry-run/${id(view)}`),
-    /** Judge pictures as enrolment would; nothing is stored. */
-    checkGesture: (images, gallery) =>
-        request("POST", "api/gestures/check", { body: inGallery(imageForm(images), gallery) }),
+    /**
+     * Judge pictures as enrolment would; nothing is stored. `gesture` is the id of the one that they are
+     * to be more samples of, `sign` the name of the starter sign that they have to show.
+     */
+    checkGesture(images, gallery, { gesture = null, sign = null } = {}) {
+        const form = gesture ? imageForm(images) : inGallery(imageForm(images), gallery);
+        if (gesture) form.append("gesture", gesture);
+        if (sign) form.append("sign", sign);
+        return request("POST", "api/gestures/check", { body: form });
+    },
     addSamples: (gesture, images) =>
         change("POST", `api/gestures/${id(gesture)}/samples`, { body: imageForm(images) }),
     /** The same, in place of all samples that there are. */
@@ -130,11 +137,6 @@ export const api = Object.freeze({
     /** Take a change of gestures back. */
     undo: (made) => change("POST", `api/changes/${id(made)}/undo`),
     deleteGesture: (gesture) => change("DELETE", `api/gestures/${id(gesture)}`),
-    recognise(image, gallery) {
-        const form = inGallery(new FormData(), gallery);
-        form.append("image", image, "still.jpg");
-        return request("POST", "api/recognise", { body: form });
-    },
     /** Address of a template's picture; `version` makes it new after a change. */
     templateUrl(gesture, version, sample = 0) {
         return `api/gestures/${id(gesture)}/template.png?sample=${sample}&v=${id(version)}&ticket=${ticket()}`;

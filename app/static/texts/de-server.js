@@ -185,6 +185,7 @@ export const phrases = [
     ["the hand is cut off at the {} of the picture: show all of it", "die Hand ragt aus dem Bild ({1}): Zeigen Sie sie ganz"],
     ["the hand is too small: its palm is {} pixels wide, at least {} are needed; come closer to the camera", "die Hand ist zu klein: Ihre Fläche ist {1} Punkte breit, mindestens {2} sind nötig; kommen Sie näher zur Kamera"],
     ["there are two hands in the picture, or a thing that looks like one: show one hand and nothing else", "zwei Hände sind im Bild, oder etwas, das so aussieht: Zeigen Sie nur eine Hand"],
+    ["it is not clear which thing in the picture is the hand: show one hand, and nothing else that is like one", "es ist nicht klar, was im Bild die Hand ist: Zeigen Sie eine Hand, und sonst nichts, das so aussieht"],
     ["no wrist in view: show the whole hand with its wrist, sleeves pulled back", "kein Handgelenk zu sehen: Zeigen Sie die ganze Hand mit Handgelenk, den Ärmel zurückgezogen"],
     ["the picture is blurred (sharpness {}, at least {} needed): hold the hand still, and give it more light", "das Bild ist unscharf (Schärfe {1}, mindestens {2} nötig): Halten Sie die Hand still, und machen Sie mehr Licht"],
     ["hardly any wrist is in view: hold the hand higher", "kaum Handgelenk zu sehen: Halten Sie die Hand höher"],

@@ -5,6 +5,9 @@ import { asSentence, plural } from "./forms.js";
 
 export { phrases };
 
+const NUMBERS = ["ist kein Finger", "ist ein Finger", "sind zwei Finger", "sind drei Finger", "sind vier Finger", "sind fünf Finger"];
+const many = (count) => NUMBERS[count] ?? `sind ${count} Finger`;
+
 export const texts = Object.freeze({
     title: "Farhand",
     skip: "Zum Cockpit springen",
@@ -517,6 +520,7 @@ export const texts = Object.freeze({
             all: "Alle Gesten",
             tile: (name, status) => `${name}: ${status}`,
             statuses: { now: "jetzt", open: "noch offen", taught: "eingelernt", skipped: "übersprungen" },
+            takes: "Die eben aufgenommenen Bilder",
             phases: {
                 change: "Jetzt diese: Ändern Sie Ihre Hand.",
                 show: "Zeigen Sie dies, die Handfläche zur Kamera, und halten Sie still.",
@@ -543,6 +547,7 @@ export const texts = Object.freeze({
                 cut_off: "Ihre Hand ragt aus dem Bild.",
                 too_small: "Ihre Hand ist zu weit weg.",
                 two_hands: "Zwei Hände sind im Bild, oder etwas, das so aussieht.",
+                unclear: "Es ist nicht klar, was in den Bildern Ihre Hand ist.",
                 no_wrist: "Ihr Handgelenk ist nicht zu sehen. Halten Sie die Hand höher, den Ärmel zurückgezogen.",
                 blurred: "Die Bilder sind unscharf. Halten Sie still, und machen Sie mehr Licht.",
                 no_picture: "Die Kamera gab kein Bild.",
@@ -717,6 +722,41 @@ export const texts = Object.freeze({
         lasting: (what, seconds) => `${what}, ${seconds} s lang`,
         sequence: (first, more) => (more ? `${first}, dann ${plural(more, "Schritt", "Schritte")}` : first),
         unknown: "unbekannte Aktion",
+    },
+
+    seen: {
+        fingers: {
+            thumb: "Daumen",
+            index: "Zeigefinger",
+            middle: "Mittelfinger",
+            ring: "Ringfinger",
+            little: "kleiner Finger",
+        },
+        sides: { left: "eine linke Hand", right: "eine rechte Hand", unsure: "eine Hand" },
+        hand: (side, fingers, mended) => `Gesehen: ${side}. Gestreckt: ${fingers}. ${mended}`,
+        noFinger: "kein Finger",
+        mended: "Ihr Umriss kommt von den Gelenken.",
+        nothing: "Darin sind keine Gelenke einer Hand zu sehen.",
+        advised: (advice) => `Hand gefunden; ${advice}`,
+        palmOnly: (asked) => `Nur Ihre Handfläche ist zu sehen: Verlangt ${many(asked)}.`,
+        count: (seen, asked) => `Zu sehen ${many(seen)}: Verlangt ${many(asked)}.`,
+        others: (stretch, bend) =>
+            `Andere Finger sind verlangt.${stretch ? ` Strecken: ${stretch}.` : ""}${bend ? ` Beugen: ${bend}.` : ""}`,
+    },
+
+    tryNow: {
+        title: (name) => `„${name}“ jetzt probieren`,
+        show: (name) => `Zeigen Sie „${name}“, und halten Sie es eine Sekunde.`,
+        held: (name) => `„${name}“ wird erkannt.`,
+        match: (name) => `„${name}“`,
+        other: (name) => `gesehen als „${name}“`,
+        nothing: "keine Geste zu sehen",
+        noPicture: "wartet auf das Bild",
+        hint: "Wird sie nicht oder als andere Geste erkannt, nehmen Sie noch ein Bild auf, so wie Sie sie jetzt halten.",
+        moves: "Sie steuern: Diese Geste bewegt den Arm.",
+        stops: "Diese stoppt den Roboter wirklich.",
+        add: "Bild hinzufügen",
+        done: "Fertig",
     },
 
     teach: {

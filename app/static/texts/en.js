@@ -5,6 +5,10 @@ import { asSentence, plural } from "./forms.js";
 /** The server speaks English: its words stay as they are. */
 export const phrases = null;
 
+const NUMBERS = ["no finger", "one finger", "two fingers", "three fingers", "four fingers", "five fingers"];
+const fingers = (count) => NUMBERS[count] ?? `${count} fingers`;
+const many = (count) => `${fingers(count)} ${count === 1 || count === 0 ? "is" : "are"}`;
+
 export const texts = Object.freeze({
     title: "Farhand",
     skip: "Skip to the cockpit",
@@ -516,6 +520,7 @@ export const texts = Object.freeze({
             all: "All gestures",
             tile: (name, status) => `${name}: ${status}`,
             statuses: { now: "now", open: "to be taught", taught: "taught", skipped: "skipped" },
+            takes: "The pictures just taken",
             phases: {
                 change: "Now this one: change your hand.",
                 show: "Show this, the palm to the camera, and hold still.",
@@ -540,6 +545,7 @@ export const texts = Object.freeze({
                 cut_off: "Your hand runs out of the picture.",
                 too_small: "Your hand is too far away.",
                 two_hands: "There are two hands in the picture, or something like one.",
+                unclear: "It is not clear which thing in the pictures is your hand.",
                 no_wrist: "Your wrist is not seen. Hold your hand higher, sleeves pulled back.",
                 blurred: "The pictures are blurred. Hold still, and give more light.",
                 no_picture: "The camera gave no picture.",
@@ -714,6 +720,41 @@ export const texts = Object.freeze({
         lasting: (what, seconds) => `${what} for ${seconds} s`,
         sequence: (first, more) => (more ? `${first}, then ${plural(more, "step", "steps")}` : first),
         unknown: "unknown action",
+    },
+
+    seen: {
+        fingers: {
+            thumb: "thumb",
+            index: "index finger",
+            middle: "middle finger",
+            ring: "ring finger",
+            little: "little finger",
+        },
+        sides: { left: "a left hand", right: "a right hand", unsure: "a hand" },
+        hand: (side, fingers, mended) => `Seen: ${side}. Stretched: ${fingers}. ${mended}`,
+        noFinger: "no finger",
+        mended: "Its outline is taken from its joints.",
+        nothing: "No hand's joints are seen in it.",
+        advised: (advice) => `hand found; ${advice}`,
+        palmOnly: (asked) => `Only your palm is seen: ${many(asked)} asked.`,
+        count: (seen, asked) => `That is ${fingers(seen)}: ${many(asked)} asked.`,
+        others: (stretch, bend) =>
+            `Other fingers are asked.${stretch ? ` Stretch: ${stretch}.` : ""}${bend ? ` Bend: ${bend}.` : ""}`,
+    },
+
+    tryNow: {
+        title: (name) => `Try “${name}” now`,
+        show: (name) => `Show “${name}”, and hold it for a second.`,
+        held: (name) => `“${name}” is known.`,
+        match: (name) => `“${name}”`,
+        other: (name) => `seen as “${name}”`,
+        nothing: "no gesture is seen",
+        noPicture: "waiting for the picture",
+        hint: "If it is not known, or seen as another gesture, add a picture as you hold it now.",
+        moves: "You drive: this gesture moves the arm.",
+        stops: "This one really stops the robot.",
+        add: "Add a picture",
+        done: "Done",
     },
 
     teach: {

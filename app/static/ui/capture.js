@@ -1,7 +1,8 @@
 // Taking still pictures of the hand, with a countdown, and saying at once whether one is usable.
 
-import { texts, told } from "../texts/texts.js";
+import { texts } from "../texts/texts.js";
 import { button, el, setLabel, setText } from "./dom.js";
+import { Take } from "./take.js";
 import { describeError } from "./words.js";
 
 const words = texts.teach;
@@ -14,17 +15,17 @@ const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
 /**
  * `video` is the source that plays now; `grab()` gives its picture as a JPEG Blob or null;
- * `recognise(blob)` says what the server sees in it. `stills` holds the Blobs taken.
+ * `check(blob)` has the server judge it as enrolment would. `stills` holds the Blobs that it does not
+ * refuse.
  */
 export class Capture {
     #run = 0;
     #counting = false;
 
-    constructor({ video, store, grab, recognise, ownName, onTaken }) {
+    constructor({ video, store, grab, check, onTaken }) {
         this.store = store;
         this.grab = grab;
-        this.recognise = recognise;
-        this.ownName = ownName;
+        this.check = check;
         this.onTaken = onTaken;
         this.video = video;
         this.entries = [];
@@ -51,16 +52,18 @@ export class Capture {
     }
 
     get stills() {
-        return this.entries.map(({ blob }) => blob);
+        return this.entries.filter(({ state }) => state !== "bad").map(({ blob }) => blob);
     }
 
     /** Stop the countdown and the preview. */
     close() {
         this.#run += 1;
         clearInterval(this.timer);
+        for (const take of this.entries) take.close();
     }
 
     clear() {
+        for (const take of this.entries) take.close();
         this.entries = [];
         this.#draw();
     }
@@ -114,46 +117,32 @@ export class Capture {
     }
 
     async #add(blob) {
-        const canvas = el("canvas", { width: 96, height: 72 });
-        const verdict = el("p", { class: "still-verdict", text: words.checking });
-        const remove = button("", { class: "round small", iconName: "close" });
-        const item = el("li", {}, canvas, verdict, remove);
-        const entry = { blob, item, remove };
-        remove.addEventListener("click", () => {
-            this.entries = this.entries.filter((other) => other !== entry);
+        const take = new Take(blob, () => {
+            this.entries = this.entries.filter((other) => other !== take);
+            take.close();
             this.#draw();
+            this.one.focus();
         });
-        this.entries.push(entry);
+        this.entries.push(take);
         this.onTaken();
         this.#draw();
-        const bitmap = await createImageBitmap(blob);
-        const scale = Math.min(96 / bitmap.width, 72 / bitmap.height);
-        const [width, height] = [bitmap.width * scale, bitmap.height * scale];
-        canvas.getContext("2d").drawImage(bitmap, (96 - width) / 2, (72 - height) / 2, width, height);
-        bitmap.close();
         try {
-            const answer = await this.recognise(blob);
-            if (!answer.roi) {
-                item.classList.add("is-bad");
-                setText(verdict, told(answer.reason));
-                return;
-            }
-            const seen = answer.match && answer.match.gesture;
-            const other = seen && seen !== this.ownName() ? seen : null;
-            item.classList.add("is-good");
-            setText(verdict, other ? words.stillResembles(other) : words.stillGood);
+            const answer = await this.check(blob);
+            const likely = (answer.confusions || []).find(({ level, active }) => level === "likely" && active !== false);
+            const other = likely ? likely.gesture : null;
+            take.judged(answer.images[0], other);
             setText(this.note, other ? words.resembles(other) : "");
         } catch (error) {
-            item.classList.add("is-bad");
-            setText(verdict, describeError(error));
+            if (typeof error.status !== "number") throw error; // a mistake of the page
+            take.failed(describeError(error));
         }
     }
 
     #draw() {
         this.list.replaceChildren(
-            ...this.entries.map(({ item, remove }, index) => {
+            ...this.entries.map(({ element, remove }, index) => {
                 remove.setAttribute("aria-label", words.removeStill(index + 1));
-                return item;
+                return element;
             }),
         );
         if (!this.entries.length) setText(this.note, "");

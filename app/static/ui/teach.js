@@ -4,6 +4,7 @@ import { texts } from "../texts/texts.js";
 import { ActionForm } from "./action-form.js";
 import { Capture } from "./capture.js";
 import { button, el, setText } from "./dom.js";
+import { knownSign } from "./first/drawing.js";
 import { PathView } from "./path-view.js";
 import { formerVersions, programCheck } from "./program-check.js";
 import { describeError } from "./words.js";
@@ -13,11 +14,12 @@ const MOST_THUMBS = 12;
 
 /**
  * Contents for the sheet. `gesture` is null to enrol a new one. `act` does the work and throws
- * ApiError: {create, update, addSamples, remove, versions, restore, check, forgetPath}. `view3d` shows
- * the way of a dry run. `done(text, changes)` closes the sheet; `changes` are the ids to take back by
- * what was changed.
+ * ApiError: {create, update, addSamples, remove, versions, restore, check, forgetPath}. `look(picture,
+ * {gesture, sign})` has a picture judged. `view3d` shows the way of a dry run. `done(text, changes,
+ * taught)` closes the sheet; `changes` are the ids to take back by what was changed, `taught` the
+ * gesture that has new pictures, or null.
  */
-export function teachContent({ gesture, store, video, grab, act, recognise, templateUrl, view3d, done }) {
+export function teachContent({ gesture, store, video, grab, act, look, templateUrl, view3d, done }) {
     const name = el("input", {
         id: "teach-name",
         name: "name",
@@ -36,10 +38,14 @@ export function teachContent({ gesture, store, video, grab, act, recognise, temp
         video,
         store,
         grab,
-        recognise,
-        ownName: () => (gesture ? gesture.name : null),
+        check: (picture) => look(picture, { gesture: gesture && gesture.id, sign: signNow() }),
         onTaken: () => setText(problem, ""),
     });
+    /** The starter sign that is taught here, if it is one. */
+    function signNow() {
+        return knownSign(gesture ? gesture.name : name.value.trim().toLowerCase());
+    }
+
     const path = new PathView(view3d, act.forgetPath);
     const problem = el("p", { class: "problem-line", role: "alert", id: "teach-problem" });
     const save = button(gesture ? words.saveChanges : words.save, {
@@ -82,8 +88,8 @@ export function teachContent({ gesture, store, video, grab, act, recognise, temp
         if (!form.check()) return refuse("", null);
         if (!gesture) {
             if (!capture.stills.length) return refuse(words.stillsMissing, capture.one);
-            const { change } = await act.create(wanted, form.value(), capture.stills);
-            return done(words.saved(wanted), [change]);
+            const { change, ...now } = await act.create(wanted, form.value(), capture.stills);
+            return done(words.saved(wanted), [change], now);
         }
         const changes = {};
         if (wanted !== gesture.name) changes.name = wanted;
@@ -93,11 +99,14 @@ export function teachContent({ gesture, store, video, grab, act, recognise, temp
             if (Number.isInteger(gesture.version)) changes.version = gesture.version;
         }
         if (Object.keys(changes).length) made.push((await act.update(gesture.id, changes)).change);
+        let taught = null;
         if (capture.stills.length) {
-            made.push((await act.addSamples(gesture.id, capture.stills)).change);
+            const { change, ...now } = await act.addSamples(gesture.id, capture.stills);
+            made.push(change);
+            taught = now;
             capture.clear();
         }
-        return done(words.saved(wanted), made);
+        return done(words.saved(wanted), made, taught);
     }
 
     const row = el("div", { class: "row end" }, save);

@@ -324,12 +324,29 @@ def test_a_check_becomes_a_verdict(modules: Page) -> None:
     assert verdict([None], {**left, "active": False})["good"], "what is retired is not matched"
 
 
+def test_who_means_another_sign_may_keep_it(modules: Page) -> None:
+    sign = {"code": "count", "seen": 2, "asked": 1, "stretch": [], "bend": ["middle"]}
+    unlike = {"accepted": False, "problem": "not_the_sign", "reason": "two", "sign": sign}
+    blurred = {"accepted": False, "problem": "blurred", "reason": "blurred", "sign": None}
+    script = "return [m.verdict(a, 'own'), m.accepted(a, ['x', 'y', 'z'])]"
+    answer = {"images": [unlike, blurred, unlike], "confusions": []}
+    found, kept = run(modules, "ui/first/verdict.js", script, answer)
+    assert (found["good"], found["usable"], found["code"]) == (False, True, "not_the_sign")
+    assert found["sign"] == sign
+    assert kept == ["x", "z"]
+    good = {"accepted": True, "problem": None, "reason": None, "sign": None}
+    answer = {"images": [unlike, good, unlike], "confusions": []}
+    found, kept = run(modules, "ui/first/verdict.js", script, answer)
+    assert (found["good"], kept) == (True, ["y"])
+
+
 BURST = """
 const asked = [];
+const signs = [];
 let saved = null;
 const saving = new Promise((go) => { saved = go; });
 const act = {
-    check: async (pictures) => { asked.push(["check", pictures.length]); return a; },
+    check: async (pictures, sign) => { asked.push(["check", pictures.length]); signs.push(sign); return a; },
     save: async (gesture, pictures) => { asked.push([gesture.id, pictures.length]); await saving; },
 };
 let taken = 0;

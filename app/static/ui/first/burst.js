@@ -16,7 +16,7 @@ export class Burst {
 
     /**
      * @param {function(): Promise<?Blob>} take one picture
-     * @param {{check: function(Blob[]), save: function(object, Blob[])}} act ask the server; both throw
+     * @param {{check: function(Blob[], ?string), save: function(object, Blob[])}} act ask the server; both throw
      *   ApiError
      */
     constructor(take, act) {
@@ -44,21 +44,24 @@ export class Burst {
     }
 
     /**
-     * Have the pictures of `gesture` checked once they are taken.
-     * @returns {Promise<?object>} see verdict(), with `pictures` to save; null when next() was called
-     *   meanwhile. Throws ApiError.
+     * Have the pictures of `gesture` checked once they are taken; `sign` is the starter sign that they
+     * have to show, or null.
+     * @returns {Promise<?object>} see verdict(), with `pictures` to save, and all of them with what the
+     *   server says of each as `taken`, [{picture, image}]; null when next() was called meanwhile. Throws
+     *   ApiError.
      */
-    async judge(gesture) {
+    async judge(gesture, sign = null) {
         const run = this.#run;
         const pictures = (await Promise.all(this.#pictures)).filter(Boolean);
         await this.#saving;
         if (run !== this.#run) return null;
         if (!pictures.length) {
-            return { good: false, usable: false, code: "no_picture", reason: "", other: null, pictures };
+            return { good: false, usable: false, code: "no_picture", reason: "", other: null, pictures, taken: [] };
         }
-        const answer = await this.#act.check(pictures);
+        const answer = await this.#act.check(pictures, sign);
         if (run !== this.#run) return null;
-        return { ...verdict(answer, gesture.id), pictures: accepted(answer, pictures) };
+        const taken = pictures.map((picture, index) => ({ picture, image: answer.images[index] }));
+        return { ...verdict(answer, gesture.id), pictures: accepted(answer, pictures), taken };
     }
 
     /** Save pictures as the samples of `gesture`; `failed(error)` is called if that fails. */

@@ -8,9 +8,12 @@ const { signs } = texts.first;
 /** How to hold the hand, in words; "" for a gesture that somebody made up. */
 export const signOf = (gesture) => signs[gesture.name] || "";
 
+/** Name of the starter sign that a gesture of this name is shown by; null where it is somebody's own. */
+export const knownSign = (name) => (Object.hasOwn(signs, name) ? name : null);
+
 /** A picture to imitate, mirrored as the webcam's is. */
 export function drawing(gesture, templateUrl) {
-    const known = Object.hasOwn(signs, gesture.name);
+    const known = knownSign(gesture.name) !== null;
     return el("img", {
         class: known ? "first-drawing" : "first-drawing is-template",
         src: known

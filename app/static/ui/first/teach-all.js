@@ -6,7 +6,9 @@ import { isDriving } from "../page.js";
 import { describeError } from "../words.js";
 import { boxOf, isStill } from "./advice.js";
 import { Burst } from "./burst.js";
-import { drawing, signOf } from "./drawing.js";
+import { signWords } from "../seen.js";
+import { Take } from "../take.js";
+import { drawing, knownSign, signOf } from "./drawing.js";
 import { Glass } from "./glass.js";
 import { Round } from "./round.js";
 
@@ -38,6 +40,9 @@ export function teachStep({ store, video, progress, templateUrl, act, past, done
         skip: button(words.skip, { id: "first-skip", "aria-keyshortcuts": "S", onclick: () => wishes.skip() }),
     };
     const tiles = el("ol", { class: "first-tiles", "aria-label": words.all });
+    // Its room is kept, so that nothing moves when pictures come.
+    const takes = el("ul", { class: "stills first-takes", "aria-label": words.takes });
+    let shown = []; // Take[]
     let weak = null; // {gesture, pictures} that may be kept all the same
     let busy = false; // taken, and not judged yet
     let over = false;
@@ -72,6 +77,17 @@ export function teachStep({ store, video, progress, templateUrl, act, past, done
                 MARKS[status] && !now ? icon(MARKS[status]) : el("span", { text: gesture.name[0] }),
             ),
         );
+    }
+
+    /** Show the pictures that were just judged; [] takes them away. */
+    function show(taken) {
+        for (const take of shown) take.close();
+        shown = taken.map(({ picture, image }) => {
+            const take = new Take(picture);
+            take.judged(image);
+            return take;
+        });
+        takes.replaceChildren(...shown.map(({ element }) => element));
     }
 
     /** Change the current gesture, and begin anew with it. */
@@ -115,18 +131,19 @@ export function teachStep({ store, video, progress, templateUrl, act, past, done
         busy = true;
         let found;
         try {
-            found = await burst.judge(gesture);
+            found = await burst.judge(gesture, knownSign(gesture.name));
         } catch (error) {
             if (typeof error.status !== "number") throw error; // a mistake of the page
-            found = { good: false, usable: false, code: "failed", reason: describeError(error) };
+            found = { good: false, usable: false, code: "failed", reason: describeError(error), taken: [] };
         }
         if (!found || over) return; // somebody went elsewhere meanwhile
         busy = false;
+        show(found.taken);
         if (found.good) {
             settle(gesture, found.pictures, words.taught(gesture.name, found.code === "near" ? found.other : null));
             return;
         }
-        const problem = words.problems[found.code];
+        const problem = found.sign ? signWords(found.sign) : words.problems[found.code];
         const why = found.code === "like" ? words.like(found.other) : problem || told(found.reason) || words.problems.other;
         const more = found.code === "like" ? told(found.reason) : "";
         weak = found.usable ? { gesture, pictures: found.pictures } : null;
@@ -191,12 +208,14 @@ export function teachStep({ store, video, progress, templateUrl, act, past, done
             ),
             say,
             note,
+            takes,
             tiles,
             el("div", { class: "row end" }, keep, able.back, able.redo, able.skip),
         ],
         focus: null,
         close() {
             over = true;
+            show([]);
             clearInterval(timer);
             document.removeEventListener("keydown", key);
         },

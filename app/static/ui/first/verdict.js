@@ -2,7 +2,10 @@
 
 const GENERAL = new Set(["add_photos", "another_sign"]); // advice that a first try does not need
 
-/** Problem of most of the pictures, as {code, reason}. */
+/** A good picture of another sign than the one asked for: who means that sign may keep it. */
+const isUnlike = ({ problem }) => problem === "not_the_sign";
+
+/** Problem of most of the pictures, as {code, reason, sign}. */
 function worst(images) {
     const counts = new Map();
     for (const { problem } of images) {
@@ -10,20 +13,21 @@ function worst(images) {
     }
     const [code] = [...counts].sort((a, b) => b[1] - a[1])[0] || ["unreadable"];
     const found = images.find(({ problem }) => problem === code);
-    return { code, reason: (found && found.reason) || "" };
+    return { code, reason: (found && found.reason) || "", sign: (found && found.sign) || null };
 }
 
 /**
  * @param {object} answer of POST api/gestures/check
  * @param {string} own id of the gesture that is taught: its former pictures do not count
- * @returns {{good, usable, code, reason, other}} `good`: save it; `usable`: it may be kept although it
+ * @returns {{good, usable, code, reason, other, sign}} `good`: save it; `usable`: it may be kept although it
  *   is weak; `code`: "good", "near", "like", or the problem of the pictures; `other`: name of the
- *   gesture that it may be taken for; `reason`: more about it in the server's plain words, or ""
+ *   gesture that it may be taken for; `reason`: more about it in the server's plain words, or "";
+ *   `sign`: how the hand differs from the sign asked for, for signWords(), where that is the problem
  */
 export function verdict(answer, own) {
     const images = answer.images || [];
     if (!images.some(({ accepted }) => accepted)) {
-        return { good: false, usable: false, other: null, ...worst(images) };
+        return { good: false, usable: images.some(isUnlike), other: null, ...worst(images) };
     }
     const others = (answer.confusions || []).filter(
         ({ id, active }) => id !== own && active !== false,
@@ -41,7 +45,9 @@ export function verdict(answer, own) {
     };
 }
 
-/** Those of `pictures` that the check accepted. */
+/** Those of `pictures` that the check accepted; where it accepted none, those of another sign. */
 export function accepted(answer, pictures) {
-    return pictures.filter((_, index) => answer.images[index] && answer.images[index].accepted);
+    const of = (is) => pictures.filter((_, index) => answer.images[index] && is(answer.images[index]));
+    const good = of((image) => image.accepted);
+    return good.length ? good : of(isUnlike);
 }
