@@ -346,7 +346,11 @@ const signs = [];
 let saved = null;
 const saving = new Promise((go) => { saved = go; });
 const act = {
-    check: async (pictures, sign) => { asked.push(["check", pictures.length]); signs.push(sign); return a; },
+    check: async (pictures, sign) => {
+        asked.push(["check", pictures.length]);
+        signs.push(sign);
+        return a;
+    },
     save: async (gesture, pictures) => { asked.push([gesture.id, pictures.length]); await saving; },
 };
 let taken = 0;
@@ -373,7 +377,7 @@ ANSWER = {
 def test_a_burst_saves_what_was_accepted_and_the_next_is_checked_after_it(modules: Page) -> None:
     script = """
     const phases = [up()];
-    const first = await burst.judge({ id: "one" });
+    const first = await burst.judge({ id: "one" }, "up");
     burst.save({ id: "one" }, first.pictures, () => {});
     burst.next();
     phases.push(up());
@@ -383,11 +387,14 @@ def test_a_burst_saves_what_was_accepted_and_the_next_is_checked_after_it(module
     const before = [asked.length, over];
     saved();
     await second;
-    return { phases, pictures: first.pictures, before, asked, taken };
+    const images = first.taken.map(({ picture, image }) => [picture, image.accepted]);
+    return { phases, pictures: first.pictures, images, before, asked, signs, taken };
     """
     found = run(modules, "ui/first/burst.js", BURST + script, ANSWER)
     assert found["phases"] == ["taken", "taken"]
     assert found["pictures"] == [1, 3]
+    assert found["images"] == [[1, True], [2, False], [3, True]]
+    assert found["signs"] == ["up", None]
     assert found["before"] == [2, False]
     assert found["asked"] == [["check", 3], ["one", 2], ["check", 3]]
     assert found["taken"] == 6

@@ -71,7 +71,8 @@ def test_a_picture_is_told_to_who_does_not_see_it(modules: Page) -> None:
     assert said == [
         "Seen: a right hand. Stretched: index finger, little finger.",
         none,
-        "Seen: a hand. Stretched: index finger, little finger. Its outline is taken from its joints.",
+        "Seen: a hand. Stretched: index finger, little finger. "
+        "Its outline is taken from its joints.",
         none,
     ]
 
@@ -105,11 +106,13 @@ LIVE = """
 const store = { state: { source: { state: "none" }, connection: { state: "open" }, robot: null } };
 let asked = 0;
 const gesture = { name: "wave", action: { type: "stop" } };
-const { content, close } = m.tryContent({ gesture, store, video: {}, addPhoto: () => { asked += 1; }, done() {} });
+const addPhoto = () => { asked += 1; };
+const { content, close } = m.tryContent({ gesture, store, video: {}, addPhoto, done() {} });
 document.body.replaceChildren(...content);
 const part = (css) => document.querySelector(css);
 const show = async (name, ms) => {
-    const frame = { match: name ? { gesture: name } : null, reason: name ? null : "the hand moves" };
+    const match = name ? { gesture: name } : null;
+    const frame = { match, reason: name ? null : "the hand moves" };
     for (const end = performance.now() + ms; performance.now() < end; ) {
         Object.assign(store.state, { frame, frameAt: performance.now() });
         await new Promise((go) => setTimeout(go, 30));
@@ -149,7 +152,8 @@ def test_a_new_gesture_is_tried_at_once(modules: Page) -> None:
 
 def test_who_drives_is_told_that_the_new_gesture_moves_the_arm(modules: Page) -> None:
     script = """
-    Object.assign(store.state, { hello: { session: "me" }, robot: { controller: "me", armed: true } });
+    const robot = { controller: "me", armed: true };
+    Object.assign(store.state, { hello: { session: "me" }, robot });
     await show("wave", 300);
     const said = document.body.textContent;
     close();
