@@ -8,7 +8,7 @@ import pytest
 from app.config import PipelineSettings
 from app.errors import ImageRefused
 from app.pipeline import extract_template
-from app.pipeline.still import read_image
+from app.pipeline.reading import read_image
 from benchmarks.fuzz_images import Subject
 from benchmarks.mutated_images import mutated
 from tests.pipeline.drawing import encoded

@@ -115,6 +115,43 @@ def test_a_photograph_gives_landmarks_and_a_template_for_enrolment() -> None:
         take_shot(jpeg(room()), SETTINGS)
 
 
+def test_what_was_seen_is_in_pixels_of_the_photograph() -> None:
+    picture = in_room("forward")
+    height, width = picture.shape[:2]
+    large = cv2.resize(picture, (3 * width, 3 * height), interpolation=cv2.INTER_CUBIC)
+    seen = take_shot(jpeg(large), SETTINGS).extraction.seen
+    assert seen is not None and seen.points is not None
+    assert seen.size == (3 * width, 3 * height)
+    small = find_in_photo(picture, SETTINGS.landmarks)
+    assert small is not None
+    away = np.abs(np.array(seen.points) - 3 * small.hand.points[:, :2]).max()
+    assert away < 0.1 * 3 * small.hand.palm_length
+    assert seen.stretched is not None and seen.stretched[1:] == (True, True, False, False)
+
+
+def test_a_refused_photograph_says_what_was_seen_of_it() -> None:
+    with pytest.raises(ImageRefused) as refused:
+        take_shot(jpeg(cv2.GaussianBlur(plain("stop"), (0, 0), 7)), SETTINGS)
+    assert refused.value.detail["problem"] == "blurred"
+    assert len(refused.value.detail["seen"]["landmarks"]) == 21
+    with pytest.raises(ImageRefused) as refused:
+        take_shot(jpeg(room()), SETTINGS)
+    assert refused.value.detail["problem"] == "no_hand"
+    assert refused.value.detail["seen"]["landmarks"] is None
+
+
+def test_a_thing_of_the_skin_s_colour_before_a_plain_wall_teaches_nothing() -> None:
+    """The threshold finds it, and no network takes it for a hand."""
+    skin = (120, 150, 210)
+    picture = np.full((480, 640, 3), (200, 205, 200), np.uint8)
+    cv2.ellipse(picture, (320, 230), (90, 120), 0, 0, 360, skin, -1)
+    cv2.rectangle(picture, (270, 320), (370, 480), skin, -1)
+    noise = np.random.default_rng(0).normal(0, 3, picture.shape)
+    with pytest.raises(ImageRefused) as refused:
+        take_shot(jpeg(np.clip(picture + noise, 0, 255).astype(np.uint8)), SETTINGS)
+    assert refused.value.detail["problem"] == "no_hand"
+
+
 def test_the_paper_s_way_is_whole_and_loads_no_network(matcher: PcaMatcher) -> None:
     paper = PipelineSettings.model_validate({"binarise": {"mode": "threshold"}})
     pipe = Pipeline(paper, matcher)
@@ -173,3 +210,13 @@ def test_a_real_person_s_sign_starts_from_one_photo(sign: str) -> None:
     told = list(replay(clip, Pipeline(SETTINGS, matcher)))
     started = [row["gesture"] for row in told if row.get("phase") == "start"]
     assert started and set(started) == {sign}
+
+
+@photos
+def test_where_two_networks_are_sure_of_two_places_the_photograph_is_refused() -> None:
+    """A person far away: the landmarks are hardly sure of a hand, the mask is of something else."""
+    photo = PEOPLE / "emre-body" / "closer" / "dba9879d-81c1.jpg"
+    with pytest.raises(ImageRefused) as refused:
+        take_shot(photo.read_bytes(), SETTINGS)
+    assert refused.value.detail["problem"] == "unclear"
+    assert refused.value.detail["seen"]["mask_agrees"] is False

@@ -12,7 +12,7 @@ from PIL import Image
 
 from app.errors import ImageRefused, TooLarge
 from app.pipeline import extract_template
-from app.pipeline.still import read_image
+from app.pipeline.reading import read_image
 from tests.pipeline.drawing import PHOTOS, SETTINGS, draw, encoded, jpeg
 
 DATA = Path(__file__).parent / "data"

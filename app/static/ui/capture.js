@@ -32,7 +32,7 @@ export class Capture {
         this.preview = el("canvas", { class: "capture-preview", "aria-hidden": "true" });
         this.counter = el("p", { class: "capture-count", role: "status" });
         this.note = el("p", { class: "problem-line", role: "status" });
-        this.list = el("ul", { class: "stills" });
+        this.list = el("ul", { class: "stills", "aria-live": "polite" });
         this.one = button(words.capture, {
             id: "capture-one",
             iconName: "camera",

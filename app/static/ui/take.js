@@ -43,6 +43,7 @@ export class Take {
     /** The server could not be asked. */
     failed(text) {
         this.#say("unknown", text);
+        this.#canvas.setAttribute("aria-label", text);
     }
 
     close() {

@@ -4,7 +4,7 @@ import { texts } from "../texts/texts.js";
 import { ActionForm } from "./action-form.js";
 import { Capture } from "./capture.js";
 import { button, el, setText } from "./dom.js";
-import { knownSign } from "./first/drawing.js";
+import { drawing, knownSign, signOf } from "./first/drawing.js";
 import { PathView } from "./path-view.js";
 import { formerVersions, programCheck } from "./program-check.js";
 import { describeError } from "./words.js";
@@ -157,6 +157,7 @@ export function teachContent({ gesture, store, video, grab, act, look, templateU
             "div",
             { class: "enrolled" },
             el("p", { class: "quiet", text: words.enrolled(count) }),
+            knownSign(gesture.name) && shownSign(),
             el(
                 "div",
                 { class: "thumbs" },
@@ -171,6 +172,12 @@ export function teachContent({ gesture, store, video, grab, act, look, templateU
                 ),
             ),
         );
+    }
+
+    /** How the sign is held that new pictures are compared with. */
+    function shownSign() {
+        const text = el("p", { class: "quiet", text: signOf(gesture) });
+        return el("div", { class: "teach-sign" }, drawing(gesture, templateUrl), text);
     }
 
     function deletion() {
