@@ -7,6 +7,13 @@ WORKDIR /src
 COPY requirements.lock ./
 RUN pip install --no-cache-dir uv && python -m venv /opt/farhand \
     && uv pip install --python /opt/farhand/bin/python --require-hashes --no-deps -r requirements.lock
+# The networks for hand landmarks, out of their wheel; the rest of it is not needed.
+COPY app/pipeline/hand_landmarks/mediapipe.lock ./
+RUN uv pip install --python /opt/farhand/bin/python --require-hashes --no-deps --target /tmp/mediapipe \
+        -r mediapipe.lock \
+    && install -D -m 644 -t /opt/farhand/share/farhand/models /tmp/mediapipe/mediapipe/modules/*/palm_detection_*.tflite \
+        /tmp/mediapipe/mediapipe/modules/hand_landmark/hand_landmark_*.tflite \
+    && rm -r /tmp/mediapipe
 COPY pyproject.toml README.md LICENSE ./
 COPY training/NOTICE training/NOTICE
 COPY app app
@@ -18,6 +25,7 @@ RUN useradd --system --uid 10001 --create-home farhand && install -d -m 0700 -o 
 COPY --from=build /opt/farhand /opt/farhand
 ENV PATH=/opt/farhand/bin:$PATH PYTHONUNBUFFERED=1 \
     FARHAND_DATA_DIR=/data FARHAND_HOST=0.0.0.0 FARHAND_PORT=8000 FARHAND_BEHIND_PROXY=true \
+    FARHAND_PIPELINE__LANDMARKS__FOLDER=/opt/farhand/share/farhand/models \
     FARHAND_PROXY_ADDRESSES='["127.0.0.0/8", "::1", "gateway"]'
 USER farhand
 WORKDIR /data

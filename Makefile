@@ -2,6 +2,8 @@
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
 SETUP := .venv/.set-up
+# The wheel that carries the networks for hand landmarks, installed without its dependencies.
+MODELS := app/pipeline/hand_landmarks/mediapipe.lock
 
 .PHONY: run test check lint types borders format lock wheel clean help
 
@@ -46,7 +48,7 @@ wheel: $(SETUP)  ## build the wheel into dist/
 clean:           ## remove what was made here
 	rm -rf .venv dist
 
-$(SETUP): requirements.lock requirements-dev.lock pyproject.toml
+$(SETUP): requirements.lock requirements-dev.lock $(MODELS) pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || \
 		{ echo "Farhand needs Python 3.11 (PyBullet has no wheels for newer ones); set PYTHON=/path/to/python3.11" >&2; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
@@ -54,5 +56,6 @@ $(SETUP): requirements.lock requirements-dev.lock pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --no-deps -r .venv/uv.lock
 	$(BIN)/uv pip install --quiet --python $(BIN)/python --require-hashes --no-deps \
 		-r requirements.lock -r requirements-dev.lock
+	$(BIN)/uv pip install --quiet --python $(BIN)/python --require-hashes --no-deps -r $(MODELS)
 	$(BIN)/uv pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation --editable .
 	touch $@

@@ -15,6 +15,7 @@ import typer
 from pydantic import ValidationError
 
 from app.cli_gestures import draw_operator, draw_starter_set, enrol, gestures_app, settings_for
+from app.cli_models import models_app
 from app.cli_tokens import tokens_app, trust
 from app.errors import FarhandError
 from app.log_text import LineFormatter
@@ -30,6 +31,7 @@ app = typer.Typer(
 )
 app.add_typer(gestures_app, name="gestures")
 app.add_typer(tokens_app, name="token")
+app.add_typer(models_app, name="models")
 app.command("enroll")(enrol)
 app.command("trust")(trust)
 gestures_app.command("draw")(draw_starter_set)

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from app.config import Settings
     from app.gestures import GestureStore
     from app.gestures.backup import Place
+    from app.pipeline.burst import Look
     from app.pipeline.types import U8
 
 gestures_app = typer.Typer(help="The gesture database.", no_args_is_help=True)
@@ -223,7 +224,12 @@ def draw_starter_set(
     from app.pipeline import extract_template
 
     settings = settings_for().pipeline
-    draw_set(folder, lambda image: extract_template(image, settings).template)
+
+    def extract(image: bytes) -> "tuple[U8, bytes | None]":
+        found = extract_template(image, settings)
+        return found.template, None if found.hand is None else found.hand.pack()
+
+    draw_set(folder, extract)
     print(f"starter set drawn in {folder}")
 
 
@@ -276,14 +282,18 @@ def enrol(
         raise Invalid(f"the action is not valid: {first['msg']}", action=action) from error
     settings = settings_for(data_dir=data_dir)
     name = clean_name(name)
-    templates = [pack_template(template) for template in _templates(images, settings, burst)]
+    looks = _good_looks(images, settings, burst)
+    templates = [pack_template(look.template) for look in looks if look.template is not None]
+    landmarks = [None if look.hand is None else look.hand.pack() for look in looks]
     store = open_store(settings)
     try:
         into = store.galleries.named(gallery).id
         threshold = build_matcher(store, settings.pipeline, into).max_distance
         others = store.list(into)
         confusions = confusions_json(others, settings.pipeline, threshold, name, templates)
-        gesture = store.create(name, parsed, templates, active=not inactive, gallery=into)
+        gesture = store.create(
+            name, parsed, templates, landmarks=landmarks, active=not inactive, gallery=into
+        )
     finally:
         store.close()
     print(f"enrolled {gesture.name!r} with {len(templates)} samples{', inactive' * inactive}")
@@ -293,8 +303,8 @@ def enrol(
             print(f"  {advice['message']}")
 
 
-def _templates(images: list[Path], settings: "Settings", burst: bool) -> "list[U8]":
-    """The templates of photos that are good enough; prints what could be better.
+def _good_looks(images: list[Path], settings: "Settings", burst: bool) -> "list[Look]":
+    """Photos that are good enough; prints what could be better.
 
     Raises:
         CannotStart: a file cannot be read.
@@ -327,4 +337,4 @@ def _templates(images: list[Path], settings: "Settings", burst: bool) -> "list[U
         for image, look in zip(images, looks, strict=True):
             for advice in look.advice:
                 print(f"{image}: {advice.message}")
-    return [look.template for look in looks if look.template is not None]
+    return [look for look in looks if look.template is not None]

@@ -93,6 +93,40 @@ class BinariseSettings(_Section):
     max_area: Fraction = Field(default=0.8, description="largest hand, part of the picture")
 
 
+class LandmarkSettings(_Section):
+    """Finding the hand by its landmarks, with MediaPipe's networks."""
+
+    mode: Literal["auto", "on", "off"] = Field(
+        default="auto",
+        description="auto: where the networks are on this machine and binarise.mode is auto, too; "
+        "before a plain background the threshold finds what they do not. on: the same, and without "
+        "the networks nothing starts. off: hands are found by their mask alone",
+    )
+    folder: Path | None = Field(
+        default=None,
+        description="folder that holds the networks; default: the user's own, which farhand models "
+        "add fills, then the installed package mediapipe",
+    )
+    palm: Literal["lite", "full"] = Field(
+        default="lite", description="network that finds palms in a live picture"
+    )
+    hand: Literal["lite", "full"] = Field(
+        default="lite", description="network that finds the landmarks in a live picture"
+    )
+    min_palm: Fraction = Field(
+        default=0.5, description="least score of a palm in the whole picture (MediaPipe: 0.5)"
+    )
+    min_presence: Fraction = Field(
+        default=0.5, description="least probability that a region holds a hand (MediaPipe: 0.5)"
+    )
+    working_side: int = Field(
+        default=360,
+        ge=48,
+        le=2160,
+        description="pixels; as decode.working_side, for the pictures that they look at",
+    )
+
+
 class MotionSettings(_Section):
     """The gate that lets only a hand at rest through."""
 
@@ -119,6 +153,18 @@ class MotionSettings(_Section):
     settle_threshold: Fraction = Field(
         default=0.05,
         description="it looks the same when fewer than this part of the hand's pixels mismatch",
+    )
+    hand_speed: float = Field(
+        default=2.0,
+        ge=0.0,
+        le=50.0,
+        description="palm lengths a second; a hand found by landmarks rests when it is slower",
+    )
+    hand_settle: float = Field(
+        default=0.22,
+        ge=0.0,
+        le=2.0,
+        description="in the unit of a match; it looks the same when its landmarks differ by less",
     )
 
 
@@ -198,6 +244,19 @@ class MatchSettings(_Section):
     min_reach: float = Field(
         default=0.36, ge=0.0, le=2.0, description="a match as near as this is never too far"
     )
+    landmark_max_distance: float = Field(
+        default=0.44,
+        ge=0.0,
+        le=2.0,
+        description="max_distance where hands are compared by their landmarks",
+    )
+    landmark_min_reach: float = Field(
+        default=0.28, ge=0.0, le=2.0, description="min_reach where they are"
+    )
+    either_hand: bool = Field(
+        default=True,
+        description="a gesture taught with one hand is known of the other, too; by landmarks only",
+    )
     min_margin: float = Field(
         default=0.03,
         ge=0.0,
@@ -261,6 +320,12 @@ class StillSettings(_Section):
     working_side: int = Field(
         default=320, ge=64, le=2160, description="pixels; longer side after scaling down"
     )
+    landmark_side: int = Field(
+        default=960,
+        ge=64,
+        le=4096,
+        description="pixels; the same of the picture in which landmarks are looked for",
+    )
 
 
 class QualitySettings(_Section):
@@ -295,6 +360,7 @@ class PipelineSettings(_Section):
     smooth: SmoothSettings = SmoothSettings()
     normalise: NormaliseSettings = NormaliseSettings()
     binarise: BinariseSettings = BinariseSettings()
+    landmarks: LandmarkSettings = LandmarkSettings()
     motion: MotionSettings = MotionSettings()
     roi: RoiSettings = RoiSettings()
     wrist: WristSettings = WristSettings()

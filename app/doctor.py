@@ -130,6 +130,36 @@ def check_networks(settings: Settings) -> Finding:
     return Finding(True, text)
 
 
+def check_landmarks(settings: Settings) -> Finding:
+    """MediaPipe's networks are here and run; without them hands are found by mask, which works."""
+    from app.pipeline.hand_landmarks.files import find
+    from app.pipeline.hand_landmarks.tracker import HandTracker
+
+    mine = settings.pipeline.landmarks
+    if mine.mode == "off":
+        return Finding(True, "hands are found by mask: the settings say so")
+    found = (
+        find("palm", mine.palm, mine.folder),
+        find("hand", mine.hand, mine.folder),
+        find("palm", "full", mine.folder),
+        find("hand", "full", mine.folder),
+    )
+    missing = [one for one in found if one.path is None]
+    if missing:
+        why = missing[0].why_not or f"{missing[0].model.name} is missing"
+        text = f"{why}, so hands are found by mask"
+        return Finding(mine.mode == "auto", text, "run: farhand models add")
+    track = HandTracker(mine)
+    picture = np.full((480, 640, 3), 128, np.uint8)
+    track(picture)
+    began = time.monotonic()
+    track(picture)
+    took = (time.monotonic() - began) * 1e3
+    if took > _MASK_MS_WANTED:
+        return Finding(False, f"to look for a hand takes {took:.0f} ms", "use a faster machine")
+    return Finding(True, f"hands are found by landmarks; to look for one takes {took:.0f} ms")
+
+
 def check_port(settings: Settings) -> Finding:
     """The port can be listened on."""
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
@@ -213,6 +243,7 @@ CHECKS: dict[str, Callable[[Settings], Finding]] = {
     "renderer": check_renderer,
     "codecs": check_codecs,
     "networks": check_networks,
+    "landmarks": check_landmarks,
     "port": check_port,
     "database": check_database,
     "robot node": check_node,

@@ -17,7 +17,7 @@ from typing import Any
 
 def main() -> None:
     import cv2
-    import mediapipe  # type: ignore[import-not-found]  # In the other environment alone.
+    import mediapipe
     import numpy as np
 
     cv2.setNumThreads(1)

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from app.config import PipelineSettings
 from app.gestures.synthetic import CLIP, SyntheticOperator
 from app.pipeline import STAGES, Gallery, PcaMatcher, Pipeline
-from benchmarks.recognition.modes import mask_modes
+from benchmarks.recognition.modes import compared
 from benchmarks.report import arguments, percentiles, report
 
 STARTER = Path(__file__).resolve().parents[1] / "gesture_db"
@@ -61,14 +61,12 @@ def main() -> None:
     if options.quiet_room:
         streams["at rest, "] = at_rest(pictures[len(pictures) // 2], len(pictures))
     figures: dict[str, dict[str, float]] = {}
-    for mode in mask_modes() or (None,):
-        values = {} if mode is None else {"binarise": {"mode": mode}}
-        settings = PipelineSettings.model_validate(values)
+    for mode, settings in compared().items():
         start = perf_counter()
         matcher = PcaMatcher.fit(starter_gallery(options.samples), settings.match)
         fit_ms = (perf_counter() - start) * 1000
         for stream, frames in streams.items():
-            name = stream if mode is None else f"{mode}, {stream}"
+            name = f"{mode}, {stream}"
             figures |= {f"{name}{row}": row_of for row, row_of in play(frames, settings, matcher)}
             figures[f"{name}fit of the gallery ms"] = percentiles([fit_ms])
     report(figures, options)

@@ -320,3 +320,22 @@ def test_a_program_is_tried_without_a_server(tmp_path: Path, photo: Path) -> Non
         (("forward", "--from", "moon"), "no pose 'moon' to begin at; it has: home, inspect"),
     ):
         assert text in farhand("gestures", "dry-run", *arguments, *data, fails=True).stderr
+
+
+def test_the_networks_are_listed_and_taken_out_of_a_wheel(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    rows = json.loads(farhand("models", "list", "--json").stdout)
+    assert len(rows) == 4
+    assert all(row["path"] and "MediaPipe" in row["whose"] for row in rows)
+    wheel = tmp_path / "some.whl"
+    with zipfile.ZipFile(wheel, "w") as archive:
+        for row in rows:
+            path = Path(row["path"])
+            archive.write(path, f"mediapipe/modules/{path.parent.name}/{path.name}")
+    assert "palm_detection_lite" in farhand("models", "add", "--wheel", str(wheel)).stdout
+    own = json.loads(farhand("models", "list", "--json").stdout)
+    assert all(Path(row["path"]).parent == tmp_path / "farhand" / "models" for row in own)
+    wheel.write_bytes(b"broken")
+    assert "some.whl" in farhand("models", "add", "--wheel", str(wheel), fails=True).stderr

@@ -1,13 +1,15 @@
 """What ``farhand doctor`` says when a part is missing. Times are among what it checks."""
 
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 import onnxruntime
 import pytest
 
 from app.config import Settings
-from app.doctor import CHECKS, check_networks, run_checks
+from app.doctor import CHECKS, check_landmarks, check_networks, run_checks
 from app.pipeline import features, mask, network
+from app.pipeline.hand_landmarks import files
 
 
 @pytest.fixture
@@ -44,6 +46,21 @@ def test_a_network_that_is_broken_is_named(
     monkeypatch.setattr(mask, "MODEL", str(tmp_path / "broken.onnx"))
     assert not run_checks(Settings())
     assert "FAIL networks    the network" in capsys.readouterr().out
+
+
+def test_missing_landmarks_are_said_and_are_no_failure_unless_asked_for(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def missing(name: str) -> None:
+        raise PackageNotFoundError(name)
+
+    assert "found by landmarks" in check_landmarks(Settings()).text
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    monkeypatch.setattr(files, "distribution", missing)
+    finding = check_landmarks(Settings())
+    assert finding.fine and "is missing, so hands are found by mask" in finding.text
+    on = {"pipeline": {"landmarks": {"mode": "on"}}}
+    assert not check_landmarks(Settings.model_validate(on)).fine
 
 
 def test_a_network_is_read_once_and_runs_on_one_thread() -> None:

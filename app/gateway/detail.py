@@ -32,7 +32,7 @@ def detail(result: FrameResult, enrolled: Enrolled) -> dict[str, Any]:
         "mask": bit_png(_shrunk(result.mask)),
         "template": None if template is None else bit_png(template),
         "distances": {name: round(value, 4) for name, value in result.distances.items()},
-        "threshold": enrolled.matcher.max_distance,
+        "threshold": _matcher(result, enrolled).max_distance,
         "wrist": None if result.wrist is None else result.wrist._asdict(),
     }
 
@@ -49,7 +49,7 @@ def glass(result: FrameResult, enrolled: Enrolled, settings: PipelineSettings) -
         if palm is None
         else {"x": palm.x, "y": palm.y, "radius": round(palm.radius, 1)},
         "histogram": None if palm is None else _histogram(result),
-        "projection": _projection(result, enrolled.matcher),
+        "projection": _projection(result, _matcher(result, enrolled)),
         "nearest": _nearest(result, enrolled),
         "answer": _answer(result, settings),
     }
@@ -87,6 +87,11 @@ def _shrunk(mask: U8) -> U8:
     return np.asarray(cv2.resize(mask, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
+def _matcher(result: FrameResult, enrolled: Enrolled) -> PcaMatcher:
+    """What the frame was matched by."""
+    return enrolled.matcher.best if result.by_landmarks else enrolled.matcher
+
+
 def _histogram(result: FrameResult) -> dict[str, Any]:
     side: Side = "bottom" if result.wrist is None else result.wrist.side
     axis = "y" if side in ("bottom", "top") else "x"
@@ -121,7 +126,7 @@ def _nearest(result: FrameResult, enrolled: Enrolled) -> list[dict[str, Any]]:
     ids = enrolled.ids
     found = []
     for i in np.argsort(distances, kind="stable")[:NEAREST]:
-        gesture, sample = enrolled.matcher.templates[i]
+        gesture, sample = _matcher(result, enrolled).templates[i]
         found.append(
             {
                 "id": ids.get(gesture),

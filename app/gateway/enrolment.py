@@ -16,6 +16,7 @@ from app.gestures import Gesture
 from app.pipeline import pack_template, unpack_template
 from app.pipeline.burst import Look, choose, look_at, see
 from app.pipeline.confusion import Comparison, Confusion, compare
+from app.pipeline.hand_landmarks.shape import HandShape
 from app.pipeline.quality import Finding
 from app.pipeline.types import U8
 
@@ -44,8 +45,16 @@ class Judged:
     @property
     def templates(self) -> list[bytes]:
         """What is to be enrolled, 600 bytes each."""
-        kept = (self.looks[number].template for number in self.kept)
-        return [pack_template(template) for template in kept if template is not None]
+        return [pack_template(template) for template, _ in self._samples()]
+
+    @property
+    def landmarks(self) -> list[bytes | None]:
+        """Of each of these, 254 bytes; None where they are not known."""
+        return [None if hand is None else hand.pack() for _, hand in self._samples()]
+
+    def _samples(self) -> list[tuple[U8, HandShape | None]]:
+        looks = (self.looks[number] for number in self.kept)
+        return [(look.template, look.hand) for look in looks if look.template is not None]
 
     def images_json(self) -> list[dict[str, Any]]:
         """The verdict on each image, as docs/protocol.md shows it."""

@@ -1,5 +1,6 @@
 """The gesture database as the sessions need it: a fitted matcher, and the action of each name."""
 
+import functools
 import hashlib
 import logging
 import threading
@@ -13,11 +14,12 @@ from sqlalchemy.exc import ArgumentError
 
 from app.config import PipelineSettings, Settings
 from app.errors import NotFound
-from app.gateway.learning import Pairs, fit
+from app.gateway.learning import Samples, fit
 from app.gestures import Gesture, GestureStore
 from app.gestures.backup import Place
 from app.gestures.records import SHARED
 from app.gestures.recovery import Hold, check_there, open_or_set_aside
+from app.gestures.setfile import read_set
 from app.link.actions import Action
 from app.pipeline import PcaMatcher
 from app.private import private_file, private_folder
@@ -98,11 +100,29 @@ def open_for_server(settings: Settings) -> tuple[GestureStore, Hold | None]:
         raise
 
 
+@functools.cache
+def starter_landmarks() -> dict[bytes, bytes]:
+    """Landmarks of the starter set's templates."""
+    folder = starter_set()
+    return {
+        template: hand
+        for entry in (read_set(folder) if folder is not None else ())
+        for template, hand in zip(entry.templates, entry.landmarks, strict=False)
+        if hand is not None
+    }
+
+
+def with_starter(samples: Samples) -> Samples:
+    """The same, where databases older than landmarks have those of the starter set's templates."""
+    known = starter_landmarks()
+    return [(name, template, hand or known.get(template)) for name, template, hand in samples]
+
+
 def build_matcher(
     store: GestureStore, settings: PipelineSettings, gallery: str = SHARED
 ) -> PcaMatcher:
     """A matcher for everything that is enrolled in a gallery now."""
-    return fit(store.templates(gallery), settings)
+    return fit(with_starter(store.active_samples(gallery)), settings)
 
 
 @dataclass(frozen=True)
@@ -134,7 +154,7 @@ class LiveGallery:
     """
 
     def __init__(self, store: GestureStore, settings: PipelineSettings) -> None:
-        self.learn: Callable[[Pairs, PipelineSettings], PcaMatcher] = fit
+        self.learn: Callable[[Samples, PipelineSettings], PcaMatcher] = fit
         """Makes a matcher. Takes long, and would hold up everything in the process of a server,
         which puts another in its place."""
         self._store = store
@@ -187,16 +207,16 @@ class LiveGallery:
                 self._forget_unused()
             return found
 
-    def prepared(self, pairs: Pairs, matcher: PcaMatcher) -> None:
+    def prepared(self, samples: Samples, matcher: PcaMatcher) -> None:
         """Take what was learned of what a gallery is about to hold: :meth:`refresh` need not.
 
         The newest is kept, until a gallery holds it.
 
         Args:
-            pairs: What it will hold.
+            samples: What it will hold.
             matcher: Fitted to that.
         """
-        self._prepared = _digest(pairs), matcher
+        self._prepared = _digest(samples), matcher
 
     def refresh(self) -> bool:
         """Read the galleries in use again if anything changed, whichever process changed it.
@@ -231,19 +251,19 @@ class LiveGallery:
         content = tuple(gesture for gesture in self._store.list(id) if gesture.active)
         if before is not None and before.content == content:
             return before
-        pairs = _pairs(content)
+        samples = _samples(content)
         actions = {gesture.name: gesture.action for gesture in content}
         # What gestures do is changed more often than how they look.
-        same = before is not None and _digest(_pairs(before.content)) == _digest(pairs)
-        matcher = before.matcher if before is not None and same else self._matcher(pairs)
+        same = before is not None and _digest(_samples(before.content)) == _digest(samples)
+        matcher = before.matcher if before is not None and same else self._matcher(samples)
         return Enrolled(version, matcher, actions, id, content)
 
-    def _matcher(self, pairs: Pairs) -> PcaMatcher:
+    def _matcher(self, samples: Samples) -> PcaMatcher:
         prepared = self._prepared
-        if prepared is not None and prepared[0] == _digest(pairs):
+        if prepared is not None and prepared[0] == _digest(samples):
             self._prepared = None
             return prepared[1]
-        return self.learn(pairs, self._settings)
+        return self.learn(samples, self._settings)
 
     def _forget_unused(self) -> None:
         unused = [id for id in self._fitted if self._users[id] <= 0]
@@ -251,13 +271,19 @@ class LiveGallery:
             del self._fitted[id]
 
 
-def _pairs(content: Iterable[Gesture]) -> Pairs:
-    return [(gesture.name, sample.template) for gesture in content for sample in gesture.samples]
+def _samples(content: Iterable[Gesture]) -> Samples:
+    return with_starter(
+        [
+            (gesture.name, sample.template, sample.landmarks)
+            for gesture in content
+            for sample in gesture.samples
+        ]
+    )
 
 
-def _digest(pairs: Pairs) -> bytes:
+def _digest(samples: Samples) -> bytes:
     """The same for the same samples of the same names, in whatever order the names come."""
     digest = hashlib.sha256()
-    for name, template in sorted(pairs, key=lambda pair: pair[0]):
-        digest.update(repr(name).encode() + template)
+    for name, template, hand in sorted(samples, key=lambda sample: sample[0]):
+        digest.update(repr(name).encode() + template + (hand or b"-"))
     return digest.digest()

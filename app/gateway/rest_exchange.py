@@ -11,6 +11,7 @@ from starlette.responses import StreamingResponse
 from app.gateway.bodies import ZIP_BODY
 from app.gateway.body_watch import still_allowed
 from app.gateway.errors import BAD_BODY
+from app.gateway.gallery import with_starter
 from app.gateway.jobs import Job
 from app.gateway.learning import fit
 from app.gateway.rest_gestures import hub_of
@@ -130,15 +131,15 @@ async def _import(
     there = await hub.database(hub.store.list, id)
     planned = await hub.database(plan_of, there, entries, existing)
     if planned.entries and expected in (None, planned.digest):  # else it is refused below
-        pairs = planned.after(there)
+        samples = with_starter(planned.after(there))
         matcher = await job.run(
             hub.long_work,
             fit,
-            pairs,
+            samples,
             hub.settings.pipeline,
             progress=lambda done, total: job.progress(read + read * done // total, 3 * read),
         )
-        hub.gallery.prepared(pairs, matcher)
+        hub.gallery.prepared(samples, matcher)
     still_allowed(request)
     return await hub.database(
         import_entries,

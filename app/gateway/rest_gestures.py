@@ -120,6 +120,7 @@ async def _create(hub: "Hub", request: Request, response: Response) -> dict[str,
         name,
         action,
         judged.templates,
+        landmarks=judged.landmarks,
         active=active,
         gallery=gallery,
         undo_as=offer.id,
@@ -310,7 +311,12 @@ async def _add(
     still_allowed(request)
     offer = UndoOffer(hub.store)
     gesture = await hub.database(
-        hub.store.add_samples, id, judged.templates, replace=replace, undo_as=offer.id
+        hub.store.add_samples,
+        id,
+        judged.templates,
+        landmarks=judged.landmarks,
+        replace=replace,
+        undo_as=offer.id,
     )
     await hub.gallery_changed()
     offer.to(response)
@@ -349,7 +355,7 @@ async def _recognise(hub: "Hub", image: bytes, enrolled: Enrolled) -> dict[str, 
         raise
     except ImageRefused as error:
         return {"match": None, "reason": error.message, "roi": None, "distances": {}}
-    matched = await hub.learners(enrolled.matcher, extraction.views)
+    matched = await hub.learners(enrolled.matcher.match_photo, extraction)
     match = matched.match
     found = None
     if match is not None and match.accepted:
@@ -359,7 +365,7 @@ async def _recognise(hub: "Hub", image: bytes, enrolled: Enrolled) -> dict[str, 
         "reason": "no gesture is enrolled yet" if match is None else match.reason,
         "roi": list(extraction.roi),
         "distances": matched.distances,
-        "threshold": enrolled.matcher.max_distance,
+        "threshold": enrolled.matcher.used_for(extraction.hand).max_distance,
     }
 
 

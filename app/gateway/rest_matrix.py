@@ -39,7 +39,8 @@ async def mix_ups(hub: "Hub", enrolled: Enrolled, job: Job) -> dict[str, Any]:
         Cancelled: somebody cancelled the job.
     """
     names = [gesture.name for gesture in enrolled.content]
-    return matrix_json(enrolled, await job.run(hub.long_work, try_all, enrolled.matcher, names))
+    tried = await job.run(hub.long_work, try_all, enrolled.matcher.best, names)
+    return matrix_json(enrolled, tried)
 
 
 def matrix_json(enrolled: Enrolled, found: MixUps) -> dict[str, Any]:

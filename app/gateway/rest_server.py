@@ -9,6 +9,7 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 from app.errors import FarhandError
 from app.gateway.auth import identity_of
 from app.gateway.pages import routes_page
+from app.pipeline.hand_landmarks.live import wanted
 
 if TYPE_CHECKING:
     from app.gateway.hub import Hub
@@ -39,6 +40,8 @@ async def health(request: Request) -> dict[str, Any]:
         "sessions": len(hub.people.sessions),
         "camera_viewers": hub.relay.viewers,
         "viser": hub.viser is not None,
+        # The networks may be missing: see farhand models.
+        "hands_by": "landmarks" if wanted(hub.settings.pipeline) else "mask",
         "robots": [
             {
                 "id": robot.id,

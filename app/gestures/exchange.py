@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from app.gestures.records import SHARED, Gesture, NewGesture
+from app.gestures.records import SHARED, Gesture, NewGesture, check_landmarks
 from app.gestures.setfile import read_set
 from app.gestures.setwriter import write_set
 from app.gestures.store import GestureStore
@@ -32,6 +32,10 @@ def entries_of(gestures: Iterable[Gesture]) -> list[NewGesture]:
             gesture.action,
             tuple(sample.template for sample in gesture.samples),
             gesture.active,
+            check_landmarks(
+                [sample.landmarks for sample in gesture.samples],
+                [sample.template for sample in gesture.samples],
+            ),
         )
         for gesture in gestures
     ]

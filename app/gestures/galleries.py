@@ -172,7 +172,7 @@ class Galleries:
             copy.updated_ms = to.created_ms
             set_action(copy, gesture.action, to.created_ms)
             for sample in gesture.samples:
-                append(copy, [sample.template], ms_of(sample.created))
+                append(copy, [sample.template], ms_of(sample.created), [sample.landmarks])
             seal_gesture(copy)
             session.add(copy)
 

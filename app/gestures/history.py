@@ -33,7 +33,10 @@ class Snapshot:
     @property
     def bytes(self) -> int:
         """About what it holds in memory."""
-        samples = sum(len(sample.template) + 200 for sample in self.gesture.samples)
+        samples = sum(
+            len(sample.template) + len(sample.landmarks or b"") + 200
+            for sample in self.gesture.samples
+        )
         return samples + 1000 * (1 + len(self.versions))
 
 

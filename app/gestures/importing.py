@@ -48,17 +48,21 @@ class Plan:
             digest.update(repr(said).encode())
             for template in entry.templates:
                 digest.update(template)
+            for landmarks in entry.landmarks:
+                digest.update(landmarks or b"-")
         return digest.hexdigest()[:32]
 
-    def after(self, there: Iterable[Gesture]) -> list[tuple[str, bytes]]:
-        """Name and template of every active sample of a gallery that holds ``there``, when done."""
+    def after(self, there: Iterable[Gesture]) -> list[tuple[str, bytes, bytes | None]]:
+        """Every active sample, as the store gives them, of a gallery that holds ``there``."""
         written = {name_key(entry.name): entry for entry in self.entries}
         kept = entries_of(one for one in there if name_key(one.name) not in written)
         return [
-            (entry.name, template)
+            (entry.name, template, hand)
             for entry in (*kept, *written.values())
             if entry.active
-            for template in entry.templates
+            for template, hand in zip(
+                entry.templates, entry.landmarks or [None] * len(entry.templates), strict=True
+            )
         ]
 
 

@@ -59,7 +59,7 @@ def put(
         set_action(row, entry.action, now)
         row.active = entry.active
         row.samples.clear()
-        append(row, entry.templates, now)
+        append(row, entry.templates, now, entry.landmarks)
         row.updated_ms = now
         seal_gesture(row)
         session.flush()

@@ -13,6 +13,9 @@ TEMPLATE_HEIGHT = 80
 TEMPLATE_BYTES = TEMPLATE_WIDTH * TEMPLATE_HEIGHT // 8
 """600 bytes: 80 rows of 60 pixels, one bit a pixel, row after row, first pixel in the highest bit
 (the order of :func:`numpy.packbits`). 1 is the hand."""
+LANDMARK_BYTES, LANDMARK_FORMAT = 254, 1
+"""21 points of the hand, in the picture and in metres, as the pipeline packs them; the first byte
+is the format. The database does not look into them."""
 NAME_MAX = 60
 """Characters of a gesture's name."""
 MAX_GESTURES = 500
@@ -39,6 +42,8 @@ class Sample:
     """600 bytes, see :data:`TEMPLATE_BYTES`."""
     created: datetime
     """UTC, in steps of a millisecond."""
+    landmarks: bytes | None = None
+    """Of the hand, :data:`LANDMARK_BYTES`; None where they are not known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +155,32 @@ def check_templates(templates: Sequence[bytes]) -> tuple[bytes, ...]:
     return tuple(bytes(template) for template in templates)
 
 
+def check_landmarks(
+    landmarks: Sequence[bytes | None], templates: Sequence[bytes]
+) -> tuple[bytes | None, ...]:
+    """The landmarks as a tuple, one a template, once each is known to be some.
+
+    Raises:
+        Invalid: not one a template, or not what the pipeline packs.
+    """
+    if not landmarks:
+        return ()
+    if len(landmarks) != len(templates):
+        raise Invalid(
+            f"{len(landmarks)} landmarks for {len(templates)} templates", field="landmarks"
+        )
+    for number, packed in enumerate(landmarks, start=1):
+        if packed is not None and (len(packed) != LANDMARK_BYTES or packed[0] != LANDMARK_FORMAT):
+            raise Invalid(
+                f"landmarks {number} have {len(packed)} bytes; {LANDMARK_BYTES} are needed, "
+                f"the first of them {LANDMARK_FORMAT}",
+                field="landmarks",
+            )
+    if all(packed is None for packed in landmarks):
+        return ()
+    return tuple(None if packed is None else bytes(packed) for packed in landmarks)
+
+
 @dataclass(frozen=True, slots=True)
 class NewGesture:
     """A gesture that is not in a database yet, such as one read from an exchange folder."""
@@ -158,3 +189,20 @@ class NewGesture:
     action: Action
     templates: tuple[bytes, ...]
     active: bool = True
+    landmarks: tuple[bytes | None, ...] = ()
+    """Of each template; empty where none has any."""
+
+
+def checked_entry(entry: NewGesture) -> NewGesture:
+    """A gesture with the name as it is kept, and sound samples.
+
+    Raises:
+        Invalid: the name, a template or landmarks are not what they should be.
+    """
+    return NewGesture(
+        clean_name(entry.name),
+        entry.action,
+        check_templates(entry.templates),
+        entry.active,
+        check_landmarks(entry.landmarks, entry.templates),
+    )

@@ -61,8 +61,13 @@ def check_gallery(row: GalleryRow) -> None:
         raise ValueError("wrong checksum")
 
 
-def append(row: GestureRow, templates: Sequence[bytes], created_ms: int) -> None:
-    """Add samples to a gesture.
+def append(
+    row: GestureRow,
+    templates: Sequence[bytes],
+    created_ms: int,
+    landmarks: Sequence[bytes | None] = (),
+) -> None:
+    """Add samples to a gesture; ``landmarks`` is empty, or one a template.
 
     Raises:
         Invalid: there would be too many.
@@ -73,13 +78,19 @@ def append(row: GestureRow, templates: Sequence[bytes], created_ms: int) -> None
             f"the gesture would have {count} samples; at most {MAX_SAMPLES} are allowed",
             field="templates",
         )
-    put_back(row, [(new_id(), template, created_ms) for template in templates])
+    known = landmarks or [None] * len(templates)
+    pairs = zip(templates, known, strict=True)
+    put_back(row, [(new_id(), template, created_ms, hand) for template, hand in pairs])
 
 
-def put_back(row: GestureRow, samples: Iterable[tuple[str, bytes, int]]) -> None:
-    """Add samples as they were: id, template, and time in ms since 1970."""
-    for id, template, created_ms in samples:
-        sample = SampleRow(id=id, template=template, created_ms=created_ms)
+Kept = tuple[str, bytes, int, bytes | None]
+"""A sample: id, template, time in ms since 1970, and landmarks."""
+
+
+def put_back(row: GestureRow, samples: Iterable[Kept]) -> None:
+    """Add samples as they were."""
+    for id, template, created_ms, landmarks in samples:
+        sample = SampleRow(id=id, template=template, created_ms=created_ms, landmarks=landmarks)
         sample.checksum = _of_sample(sample)
         row.samples.append(sample)
 
@@ -102,7 +113,12 @@ def gesture_of(row: GestureRow) -> Gesture:
         name=row.name,
         action=ACTION.validate_json(row.action),
         samples=tuple(
-            Sample(sample.id, bytes(sample.template), time_of(sample.created_ms))
+            Sample(
+                sample.id,
+                bytes(sample.template),
+                time_of(sample.created_ms),
+                None if sample.landmarks is None else bytes(sample.landmarks),
+            )
             for sample in row.samples
         ),
         created=time_of(row.created_ms),
@@ -124,7 +140,9 @@ def _of_gesture(row: GestureRow) -> int:
 
 
 def _of_sample(row: SampleRow) -> int:
-    return zlib.crc32(repr((row.id, bytes(row.template), row.created_ms)).encode())
+    fields = (row.id, bytes(row.template), row.created_ms)
+    landmarks = () if row.landmarks is None else (bytes(row.landmarks),)
+    return zlib.crc32(repr(fields + landmarks).encode())
 
 
 def _of_gallery(row: GalleryRow) -> int:

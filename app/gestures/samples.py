@@ -7,7 +7,7 @@ from app.gestures.history import History, Recorder
 from app.gestures.putting import touch
 from app.gestures.reading import row_of
 from app.gestures.records import MAX_SAMPLES, Gesture
-from app.gestures.rows import put_back
+from app.gestures.rows import Kept, put_back
 from app.gestures.tables import GestureRow, SampleRow
 from app.gestures.transactions import Transactions
 
@@ -73,13 +73,14 @@ class Samples:
         return row
 
 
-def _take(row: GestureRow, id: str) -> tuple[str, bytes, int]:
-    """Remove a sample; gives its id, template and time in ms."""
+def _take(row: GestureRow, id: str) -> Kept:
+    """Remove a sample, and give it as it was."""
     sample: SampleRow | None = next((one for one in row.samples if one.id == id), None)
     if sample is None:
         raise NotFound(f"{row.name} has no sample with the id {id[:64]!r}", id=id[:64])
     if len(row.samples) == 1:
         raise LastSample(f"it is the only sample of {row.name}; delete or retire the gesture")
-    found = sample.id, bytes(sample.template), sample.created_ms
+    landmarks = None if sample.landmarks is None else bytes(sample.landmarks)
+    found = sample.id, bytes(sample.template), sample.created_ms, landmarks
     row.samples.remove(sample)
     return found

@@ -10,8 +10,9 @@
     samples = ["forward/01.png", "forward/02.png"]
 
 Sample paths are relative to ``gestures.toml``, with forward slashes, and stay below it. Actions
-are those of :mod:`app.link.actions`. ``active = false`` marks a gesture that is not
-matched. Nothing else is allowed: what is misspelt is refused, not ignored.
+are those of :mod:`app.link.actions`. ``active = false`` marks a gesture that is not matched. In
+format 2 ``landmarks`` may name a file of 254 bytes for each sample, as the database keeps them, or
+``""`` where it has none. Nothing else is allowed: what is misspelt is refused, not ignored.
 """
 
 import json
@@ -19,7 +20,7 @@ import struct
 import tomllib
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -30,17 +31,19 @@ from app.errors import Invalid
 from app.gestures.archive import ZIP_MAX_BYTES, Archive
 from app.gestures.png import PNG_MAX_BYTES, read_template
 from app.gestures.records import (
+    LANDMARK_BYTES,
     MAX_GESTURES,
     MAX_SAMPLES,
     NewGesture,
-    check_templates,
+    checked_entry,
     clean_name,
     name_key,
 )
 from app.gestures.toml_limits import check_simple
 from app.link.actions import ACTION, Action
 
-FORMAT = 1
+FORMATS = (1, 2)
+"""2 where a gesture has landmarks; older Farhands read 1 alone."""
 INDEX = "gestures.toml"
 INDEX_MAX_BYTES = 1 << 20
 
@@ -106,9 +109,9 @@ def _parse(read: Read, progress: Progress | None = None) -> list[NewGesture]:
         raise Invalid(f"{INDEX} {error.message}".replace(f"{INDEX} {INDEX}", INDEX)) from error
     except (ValueError, RecursionError) as error:
         raise Invalid(f"{INDEX} is not TOML in UTF-8: {error}") from error
-    if index.get("format") != FORMAT or isinstance(index["format"], bool):
+    if index.get("format") not in FORMATS or isinstance(index["format"], bool):
         raise Invalid(
-            f"{INDEX} has format {index.get('format')!r}; this Farhand reads format {FORMAT}"
+            f"{INDEX} has format {index.get('format')!r}; this Farhand reads formats 1 and 2"
         )
     _no_others(index, ("format", "gesture"), INDEX)
     tables = index.get("gesture", [])
@@ -140,7 +143,7 @@ def _gesture(read: Read, table: dict[str, Any], where: str) -> NewGesture:
     except Invalid as error:
         raise Invalid(f"{where}: {error.message}") from error
     where = f"{where} ({name})"
-    _no_others(table, ("name", "action", "active", "samples"), where)
+    _no_others(table, ("name", "action", "active", "samples", "landmarks"), where)
     active = table.get("active", True)
     if not isinstance(active, bool):
         raise Invalid(f"{where}: active is true or false, not {active!r}")
@@ -155,14 +158,25 @@ def _gesture(read: Read, table: dict[str, Any], where: str) -> NewGesture:
             templates.append(read_template(read(_safe(path), PNG_MAX_BYTES)))
         except Invalid as error:
             raise Invalid(f"{where}: sample {path!r} {error.message}") from error
-    return NewGesture(name, action, _checked(templates, where), active)
-
-
-def _checked(templates: Sequence[bytes], where: str) -> tuple[bytes, ...]:
+    hands = _landmarks(read, table.get("landmarks", []), where)
+    entry = NewGesture(name, action, tuple(templates), active, hands)
     try:
-        return check_templates(templates)
+        return checked_entry(entry)
     except Invalid as error:
         raise Invalid(f"{where}: {error.message}") from error
+
+
+def _landmarks(read: Read, paths: Any, where: str) -> tuple[bytes | None, ...]:
+    """What the files of a gesture's landmarks hold; an empty path stands for none."""
+    if not isinstance(paths, list) or not all(isinstance(path, str) for path in paths):
+        raise Invalid(f"{where}: landmarks is not a list of paths")
+    hands: list[bytes | None] = []
+    for path in paths:
+        try:
+            hands.append(read(_safe(path), LANDMARK_BYTES) if path else None)
+        except Invalid as error:
+            raise Invalid(f"{where}: landmarks {path!r} {error.message}") from error
+    return tuple(hands)
 
 
 def _action(value: Any, where: str) -> Action:

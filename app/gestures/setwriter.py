@@ -15,7 +15,7 @@ from typing import Any
 from app.errors import Invalid
 from app.gestures.png import template_png
 from app.gestures.records import NewGesture
-from app.gestures.setfile import FORMAT, INDEX
+from app.gestures.setfile import INDEX
 from app.link.actions import ACTION
 
 
@@ -61,7 +61,7 @@ def zip_stream(gestures: Sequence[NewGesture]) -> Iterator[bytes]:
     """
     sink = _Sink()
     with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as archive:
-        index = [f"format = {FORMAT}\n"]
+        index = [f"format = {_format(gestures)}\n"]
         taken: set[str] = set()
         for gesture in gestures:
             part, files = _part(gesture, taken)
@@ -101,9 +101,15 @@ def _add(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
     archive.writestr(info, data)
 
 
-def _files(gestures: Iterable[NewGesture]) -> dict[str, bytes]:
+def _format(gestures: Iterable[NewGesture]) -> int:
+    """1 as long as that is enough, so that older Farhands read the set."""
+    return 2 if any(gesture.landmarks for gesture in gestures) else 1
+
+
+def _files(given: Iterable[NewGesture]) -> dict[str, bytes]:
+    gestures = list(given)
     files: dict[str, bytes] = {}
-    index = [f"format = {FORMAT}\n"]
+    index = [f"format = {_format(gestures)}\n"]
     taken: set[str] = set()
     for gesture in gestures:
         part, samples = _part(gesture, taken)
@@ -118,13 +124,25 @@ def _part(gesture: NewGesture, taken: set[str]) -> tuple[str, dict[str, bytes]]:
     digits = max(2, len(str(len(gesture.templates))))
     samples = [f"{folder}/{n:0{digits}}.png" for n in range(1, len(gesture.templates) + 1)]
     files = dict(zip(samples, map(template_png, gesture.templates), strict=True))
+    hands: list[str] = []
+    for sample, landmarks in zip(samples, gesture.landmarks, strict=bool(gesture.landmarks)):
+        hands.append("" if landmarks is None else sample.removesuffix(".png") + ".hand")
+        if landmarks is not None:
+            files[hands[-1]] = landmarks
     action = ACTION.dump_python(gesture.action, mode="json", exclude_none=True)
     part = (
         f"\n[[gesture]]\nname = {_toml(gesture.name)}\naction = {_toml(action)}\n"
         f"{'' if gesture.active else f'active = false{chr(10)}'}"
-        f"samples = [\n{''.join(f'  {_toml(sample)},{chr(10)}' for sample in samples)}]\n"
+        f"samples = {_list(samples)}\n"
     )
+    if hands:
+        part += f"landmarks = {_list(hands)}\n"
     return part, files
+
+
+def _list(paths: Iterable[str]) -> str:
+    """A list of texts in TOML, one a line."""
+    return "[\n" + "".join(f"  {_toml(path)},\n" for path in paths) + "]"
 
 
 def _slug(name: str, taken: set[str]) -> str:

@@ -13,12 +13,13 @@ from app.gestures.hand.pose import jitter
 from app.gestures.hand.poses import ALSO, POSES
 from app.gestures.hand.render import HandLook, HandView, render_hand
 from app.gestures.hand.skin import TONES
-from app.gestures.records import TEMPLATE_HEIGHT, TEMPLATE_WIDTH, NewGesture
+from app.gestures.records import TEMPLATE_HEIGHT, TEMPLATE_WIDTH, NewGesture, check_landmarks
 from app.gestures.setwriter import write_set
 from app.link.actions import Action, Gripper, Home, JogCartesian, Stop
 
-Extract = Callable[[bytes], NDArray[np.uint8]]
-"""Gives the template, shape (80, 60), 0 and 1, of an image file's bytes: the pipeline's part."""
+Extract = Callable[[bytes], tuple[NDArray[np.uint8], bytes | None]]
+"""Gives the template, shape (80, 60), 0 and 1, of an image file's bytes, and the packed landmarks:
+the pipeline's part."""
 
 SPEED = 0.10
 """m/s of the six moves."""
@@ -82,18 +83,20 @@ def starter_set(extract: Extract) -> list[NewGesture]:
     """
     gestures = []
     for name, action in ACTIONS.items():
-        templates = []
+        templates, landmarks = [], []
         for picture in starter_pictures(name):
             done, data = cv2.imencode(".png", picture)
             assert done
-            template = np.asarray(extract(data.tobytes()))
+            template, hand = extract(data.tobytes())
             if template.shape != (TEMPLATE_HEIGHT, TEMPLATE_WIDTH) or template.max() > 1:
                 raise Invalid(
                     f"a template has the shape (80, 60) and holds 0 and 1; got {template.shape}, "
                     f"up to {template.max()}"
                 )
             templates.append(np.packbits(template.astype(np.uint8)).tobytes())
-        gestures.append(NewGesture(name, action, tuple(templates)))
+            landmarks.append(hand)
+        hands = check_landmarks(landmarks, templates)
+        gestures.append(NewGesture(name, action, tuple(templates), landmarks=hands))
     return gestures
 
 

@@ -19,7 +19,9 @@ from app.gestures.records import (
     ActionVersion,
     Gesture,
     NewGesture,
+    check_landmarks,
     check_templates,
+    checked_entry,
     clean_name,
     name_key,
 )
@@ -145,8 +147,18 @@ class GestureStore:
         Raises:
             NotFound: no gallery has this id.
         """
+        return [(name, template) for name, template, _ in self.active_samples(gallery)]
+
+    def active_samples(
+        self, gallery: str = SHARED
+    ) -> builtins.list[tuple[str, bytes, bytes | None]]:
+        """The same with the landmarks of each, None where it has none.
+
+        Raises:
+            NotFound: no gallery has this id.
+        """
         return [
-            (gesture.name, sample.template)
+            (gesture.name, sample.template, sample.landmarks)
             for gesture in self.list(gallery)
             if gesture.active
             for sample in gesture.samples
@@ -158,6 +170,7 @@ class GestureStore:
         action: Action,
         templates: Sequence[bytes],
         *,
+        landmarks: Sequence[bytes | None] = (),
         active: bool = True,
         gallery: str = SHARED,
         undo_as: str | None = None,
@@ -168,6 +181,7 @@ class GestureStore:
             name: Made NFC and trimmed; 1 to 60 printable characters.
             action: What it makes the robot do.
             templates: At least one, 600 bytes each.
+            landmarks: Of each template, 254 bytes, or None; or empty for none at all.
             active: Whether it is matched from now on.
             gallery: Id of the gallery that it belongs to.
             undo_as: Id under which :meth:`undo` can take it back.
@@ -178,7 +192,7 @@ class GestureStore:
             Duplicate: the name is taken, upper and lower case being the same.
             StorageFull: no space is left; nothing was changed.
         """
-        entry = NewGesture(clean_name(name), action, check_templates(templates), active)
+        entry = checked_entry(NewGesture(name, action, tuple(templates), active, tuple(landmarks)))
         with self.history.recording("enrol", undo_as) as seen, self.base.write() as session:
             home = self.galleries.row(session, gallery)
             return put(self.base, session, home, [entry], seen, replace=False)[0]
@@ -197,12 +211,7 @@ class GestureStore:
         Raises:
             NotFound, Invalid, Duplicate, StorageFull: as in :meth:`create`.
         """
-        checked = [
-            NewGesture(
-                clean_name(entry.name), entry.action, check_templates(entry.templates), entry.active
-            )
-            for entry in entries
-        ]
+        checked = [checked_entry(entry) for entry in entries]
         with self.base.write() as session:
             home = self.galleries.row(session, gallery)
             nobody = Recorder(self.base, None)
@@ -284,6 +293,7 @@ class GestureStore:
         id: str,
         templates: Sequence[bytes],
         *,
+        landmarks: Sequence[bytes | None] = (),
         replace: bool = False,
         undo_as: str | None = None,
     ) -> Gesture:
@@ -293,13 +303,13 @@ class GestureStore:
             NotFound: no gesture has this id.
             Invalid: a template is not one, or there would be more than 1000.
         """
-        checked = check_templates(templates)
+        checked, hands = check_templates(templates), check_landmarks(landmarks, templates)
         with self.history.recording("samples", undo_as) as seen, self.base.write() as session:
             row = row_of(session, id)
             seen.before(row)
             if replace:
                 row.samples.clear()
-            append(row, checked, teaching_ms(row.home))
+            append(row, checked, teaching_ms(row.home), hands)
             return seen.after(touch(self.base, session, row))
 
     def delete(self, id: str, *, undo_as: str | None = None) -> None:

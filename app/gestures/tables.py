@@ -100,6 +100,8 @@ class SampleRow(Base):
         ForeignKey("gesture.number", ondelete="CASCADE"), index=True
     )
     template: Mapped[bytes] = mapped_column(LargeBinary(600))
+    landmarks: Mapped[bytes | None] = mapped_column(LargeBinary(254))
+    """See :class:`app.gestures.records.Sample`."""
     created_ms: Mapped[int] = mapped_column(BigInteger)
     checksum: Mapped[int] = mapped_column(BigInteger)
     """CRC-32 of the other columns."""

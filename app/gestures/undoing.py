@@ -99,7 +99,9 @@ def _restored(
         row = _born_again(session, home, snapshot)
     row.name, row.name_key, row.active = was.name, name_key(was.name), was.active
     set_action(row, was.action, now)
-    put_back(row, [(one.id, one.template, ms_of(one.created)) for one in was.samples])
+    put_back(
+        row, [(one.id, one.template, ms_of(one.created), one.landmarks) for one in was.samples]
+    )
     row.updated_ms = now
     seal_gesture(row)
     session.flush()

@@ -3,7 +3,7 @@
 from collections import deque
 
 from app.config import AgreementSettings
-from app.pipeline.types import GestureEvent
+from app.pipeline.types import Cause, GestureEvent
 
 LONGEST_GAP_S = 0.35
 """Frames farther apart than this leave open what was shown between them."""
@@ -22,6 +22,8 @@ class Agreement:
       edge gets a new chance with every frame,
     - the hand has settled (:class:`~app.pipeline.motion.MotionGate`).
 
+    :attr:`pending` says which of these is missing while a gesture is shown that has not started.
+
     It is held until no frame has shown it for the release time, or until another gesture has N of
     the last M frames; then it ends, at once, because to stop early is safe. Only to start takes
     time.
@@ -35,6 +37,7 @@ class Agreement:
     def reset(self) -> None:
         """Forget everything, without an event."""
         self.gesture: str | None = None
+        self.pending: Cause | None = None
         self._shown_at = float("-inf")
         self._last_at = float("-inf")
         self._seq = 0
@@ -71,8 +74,12 @@ class Agreement:
         self._seq = seq
         self._follow(gesture, strangeness, now)
         agreed = gesture is not None and self._votes.count(gesture) >= self._settings.votes
+        self.pending = None
         if self.gesture is None:
-            if not agreed or gesture is None or not settled or not self._lasted(now):
+            if gesture is None:
+                return None
+            self.pending = self._why_not_yet(agreed, settled, now)
+            if self.pending is not None:
                 return None
             self.gesture = gesture
             self._shown_at = now
@@ -80,6 +87,7 @@ class Agreement:
         if gesture == self.gesture:
             self._shown_at = now
         elif agreed or now - self._shown_at >= self._settings.release_s:
+            self.pending = None if gesture is None else "agreeing"
             return self._end()
         return GestureEvent(self.gesture, "hold", seq)
 
@@ -101,10 +109,16 @@ class Agreement:
             self._candidate, self._since, self._strangeness = gesture, now, []
         self._strangeness.append(min(max(strangeness, 0.0), 1.0))
 
-    def _lasted(self, now: float) -> bool:
+    def _why_not_yet(self, agreed: bool, settled: bool, now: float) -> Cause | None:
+        """Why the gesture that is shown does not start with this frame; None when it does."""
         mean = sum(self._strangeness) / len(self._strangeness)
+        if not agreed or not self._lasted(mean, now):
+            return "agreeing"
         if mean > self._settings.max_strangeness:
-            return False
+            return "doubtful"
+        return None if settled else "settling"
+
+    def _lasted(self, mean: float, now: float) -> bool:
         needed = self._settings.settle_s + self._settings.doubt_s * mean
         # Half a millisecond for times that were rounded on their way.
         return now - self._since >= needed - 0.0005

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from app.config import PipelineSettings
 from app.errors import ImageRefused, TooLarge
+from app.pipeline.hand_landmarks.shape import HandShape
 from app.pipeline.match import Gallery, PcaMatcher
 from app.pipeline.quality import Finding
 from app.pipeline.still import take_shot
@@ -35,6 +36,7 @@ class Look(NamedTuple):
 
     Attributes:
         template: (80, 60), or None when the image is refused.
+        hand: Its landmarks; None where they were not found.
         mask: (120, 160) of the hand with its arm, for seeing it move.
         problem: Why it is refused.
         advice: What would have been better.
@@ -44,6 +46,7 @@ class Look(NamedTuple):
     mask: U8 | None
     problem: Finding | None
     advice: tuple[Finding, ...] = ()
+    hand: HandShape | None = None
 
 
 def look_at(image: bytes, settings: PipelineSettings) -> Look:
@@ -63,7 +66,9 @@ def see(image: bytes, settings: PipelineSettings) -> Look:
     """
     shot = take_shot(image, settings)
     mask = cv2.resize(shot.extraction.mask, _MASK, interpolation=cv2.INTER_NEAREST)
-    return Look(shot.extraction.template, np.asarray(mask, np.uint8), None, shot.quality.advice)
+    found = shot.extraction
+    shown = np.asarray(mask, np.uint8)
+    return Look(found.template, shown, None, shot.quality.advice, found.hand)
 
 
 @dataclass(frozen=True)
@@ -104,7 +109,7 @@ def choose(looks: Sequence[Look], settings: PipelineSettings) -> Chosen:
         return Chosen(tuple(all_looks), ())
 
     unlike, stands_for = _unlike([_template(looks[number]) for number in good])
-    table = _distances([_template(looks[good[at]]) for at in unlike], settings)
+    table = _distances([looks[good[at]] for at in unlike], settings)
     weights = np.bincount(stands_for, minlength=len(unlike))
     # The frame that most frames are near to.
     reach = settings.match.max_distance
@@ -174,13 +179,18 @@ def _unlike(templates: list[U8]) -> tuple[list[int], NDArray[np.intp]]:
     return unlike, stands_for
 
 
-def _distances(templates: list[U8], settings: PipelineSettings) -> NDArray[np.float64]:
-    """(n, n) distances between templates, the smaller one of both directions."""
-    labels = tuple(f"{number:04}" for number in range(len(templates)))
+def _distances(looks: list[Look], settings: PipelineSettings) -> NDArray[np.float64]:
+    """(n, n) distances between samples, the smaller one of both directions."""
+    labels = tuple(f"{number:04}" for number in range(len(looks)))
     plain = settings.match.model_copy(update={"calibrate": False})
-    matcher = PcaMatcher.fit(Gallery(labels, np.stack(templates)), plain)
-    rows = [matcher.match_template(template).distances for template in templates]
-    table = np.array([[row[label] for label in labels] for row in rows])
+    templates = [_template(look) for look in looks]
+    hands = tuple(look.hand for look in looks)
+    matcher = PcaMatcher.fit(Gallery(labels, np.stack(templates), hands), plain)
+    rows = [
+        (matcher.match_hand(hand) if hand is not None else None) or matcher.match_template(template)
+        for template, hand in zip(templates, hands, strict=True)
+    ]
+    table = np.array([[row.distances[label] for label in labels] for row in rows])
     np.fill_diagonal(table, 0.0)
     return np.asarray(np.minimum(table, table.T), np.float64)
 

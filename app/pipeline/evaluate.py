@@ -260,17 +260,17 @@ class Tally:
 
 
 def _gallery(photos: Iterable[Photo]) -> Gallery:
-    found = [(photo.label, photo.hand.template) for photo in photos if photo.hand is not None]
+    found = [(photo.label, photo.hand) for photo in photos if photo.hand is not None]
     if not found:
         raise Invalid("no hand was found in any of the pictures")
-    return Gallery(tuple(label for label, _ in found), np.stack([t for _, t in found]))
+    return Gallery.of(found)
 
 
 def _ask(matcher: PcaMatcher, photo: Photo) -> tuple[Matched, float]:
     if photo.hand is None:
         return Matched(None, {}), photo.ms
     start = perf_counter()
-    matched = matcher(photo.hand.views)
+    matched = matcher.match_photo(photo.hand)
     return matched, photo.ms + (perf_counter() - start) * 1000
 
 

@@ -13,6 +13,8 @@ from app.config import PipelineSettings
 from app.pipeline.binarise import Binarise
 from app.pipeline.channel import Channel
 from app.pipeline.choose import Choose
+from app.pipeline.hand_landmarks.live import ByLandmarks, agrees
+from app.pipeline.hand_landmarks.types import HandLandmarks
 from app.pipeline.mask import LearnedMask, Masked
 from app.pipeline.normalise import Normalise
 from app.pipeline.palm import Palm, PalmFinder
@@ -48,7 +50,8 @@ class FindHand:
 
     Attributes:
         way: How the last mask was made, and why so.
-        looks: How often the network ran for it.
+        looks: How often the mask network ran for it.
+        hand: The landmarks that it was drawn from; None where it was found by its mask.
     """
 
     def __init__(self, settings: PipelineSettings) -> None:
@@ -64,14 +67,50 @@ class FindHand:
         self._mask: U8 = np.empty(0, np.uint8)
         self._two = False
         self._contrast = self._sure = 0.0
+        self._landmarks = ByLandmarks.where_wanted(settings)
         self.way = Way("threshold", "")
         self.looks = 0
+        self.hand: HandLandmarks | None = None
 
-    def __call__(self, pixels: U8, watch: Stopwatch, *, held: bool = False) -> Palm:
-        """Find the hand in (h, w, 3) BGR or (h, w, 1) grey; ``held``: it holds a gesture."""
+    def __call__(
+        self, pixels: U8, watch: Stopwatch, *, held: bool = False, mask: bool = True
+    ) -> Palm:
+        """Find the hand in a picture, the next of a stream.
+
+        Args:
+            pixels: (h, w, 3) BGR or (h, w, 1) grey.
+            watch: Told how long each stage took.
+            held: The hand holds a gesture.
+            mask: Whether its outline counts. Without, and where its landmarks are seen, it is drawn
+                from these and no mask is made.
+        """
         self.looks = 0
-        self.way = self._choose(pixels, held=held)
-        watch.lap("choose")
+        self.hand = None
+        if self._landmarks is None:
+            return self._by_mask(pixels, watch, held)
+        self.hand, small, drawn = self._landmarks(pixels)
+        watch.lap("find")
+        if drawn is None:
+            self.way = self._choose(small, held=held)
+            watch.lap("choose")
+            if self.way.mode == "threshold":
+                palm = self._by_mask(small, watch, held, chosen=True)
+                if self.way.mode == "threshold":
+                    return palm
+            # Where the landmarks see no hand, a mask of what is like skin is none.
+            self.way = self._landmarks.way
+            return self._landmarks.nothing(small)
+        if mask:
+            palm = self._by_mask(small, watch, held)
+            if self.why_none(palm) is None and agrees(palm, drawn, self.hand, pixels, small):
+                return palm
+        self.way = self._landmarks.way
+        return drawn
+
+    def _by_mask(self, pixels: U8, watch: Stopwatch, held: bool, *, chosen: bool = False) -> Palm:
+        if not chosen:
+            self.way = self._choose(pixels, held=held)
+            watch.lap("choose")
         if self.way.mode == "learned":
             return self._by_network(pixels, watch)
         plane = self._channel(pixels)
@@ -100,6 +139,16 @@ class FindHand:
         self.way = other
         return self._by_network(pixels, watch)
 
+    @property
+    def by_landmarks(self) -> bool:
+        """Whether hands are looked for by their landmarks first."""
+        return self._landmarks is not None
+
+    def reset(self) -> None:
+        """Forget the hand that is followed."""
+        if self._landmarks is not None:
+            self._landmarks.reset()
+
     def _by_network(self, pixels: U8, watch: Stopwatch) -> Palm:
         masked = self._network(pixels)
         self._sure = masked.sure
@@ -122,6 +171,8 @@ class FindHand:
         The network looks at the part round the hand, and at the whole picture every now and then;
         while there are two hands, every time.
         """
+        if self._landmarks is not None and self.way.mode != "threshold":
+            return self._landmarks.second and self._second_hand > 0
         if self.way.mode == "threshold":
             return two_hands(self._mask, palm, self._second_hand)
         assert self._learned is not None
@@ -135,6 +186,8 @@ class FindHand:
     def why_none(self, palm: Palm) -> str | None:
         """Why the piece last found is no hand, in plain words; None when it may be one."""
         limits = self._settings
+        if self.way.mode == "landmarks":
+            return None if palm.found or self._landmarks is None else self._landmarks.why_none()
         if self.way.mode == "learned":
             if not palm.found:
                 return "no hand in the picture"

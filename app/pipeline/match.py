@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from app.config import MatchSettings
 from app.errors import Invalid
 from app.pipeline.features import Features
+from app.pipeline.hand_landmarks.shape import HandShape, ShapeFeatures
 from app.pipeline.template import HEIGHT, WIDTH
-from app.pipeline.types import F32, U8, Cause, Look, Match
+from app.pipeline.types import F32, U8, Cause, Extraction, Look, Match
 from app.pipeline.views import Views
 
 OWN_REACH = 1.3
@@ -38,18 +39,29 @@ class Gallery:
     Attributes:
         labels: One name a template; names repeat.
         templates: (n, 80, 60) uint8 of 0 and 1.
+        hands: The landmarks of each, None where it has none; or empty for none at all.
 
     Raises:
-        Invalid: the numbers of labels and templates differ, or the shape is another.
+        Invalid: the numbers of labels, templates and hands differ, or the shape is another.
     """
 
     labels: tuple[str, ...]
     templates: U8
+    hands: tuple[HandShape | None, ...] = ()
 
     def __post_init__(self) -> None:
         expected = (len(self.labels), HEIGHT, WIDTH)
         if self.templates.shape != expected:
             raise Invalid(f"templates of shape {self.templates.shape} where {expected} is needed")
+        if self.hands and len(self.hands) != len(self.labels):
+            raise Invalid(f"{len(self.hands)} hands for {len(self.labels)} templates")
+
+    @classmethod
+    def of(cls, photos: Sequence[tuple[str, Extraction]]) -> Self:
+        """Photographs with their labels; at least one."""
+        templates = np.stack([photo.template for _, photo in photos])
+        hands = tuple(photo.hand for _, photo in photos)
+        return cls(tuple(label for label, _ in photos), templates, hands)
 
     @classmethod
     def empty(cls) -> Self:
@@ -102,6 +114,8 @@ class PcaMatcher:
         templates: For each enrolled template its label, and its number among those of the label in
             the order of the gallery, from 0.
         chart: Where they lie.
+        by_landmarks: The same for hands whose landmarks are known, where every gesture has a sample
+            with landmarks; else None, and silhouettes are compared.
     """
 
     def __init__(self, settings: MatchSettings) -> None:
@@ -110,7 +124,9 @@ class PcaMatcher:
         self.templates: tuple[tuple[str, int], ...] = ()
         self.chart = Chart(np.zeros((0, 2), np.float32), np.zeros(2, np.float32))
         self.max_distance = settings.max_distance
+        self.by_landmarks: PcaMatcher | None = None
         self._features = Features(settings)
+        self._shape_features = ShapeFeatures(either_hand=settings.either_hand)
 
     @classmethod
     def fit(
@@ -132,20 +148,53 @@ class PcaMatcher:
             matcher._fit(gallery, progress)
         return matcher
 
+    def used_for(self, hand: HandShape | None) -> "PcaMatcher":
+        """What a hand is matched by, with landmarks or without."""
+        return self if hand is None else self.best
+
+    @property
+    def best(self) -> "PcaMatcher":
+        """What a hand whose landmarks are known is matched by."""
+        return self.by_landmarks or self
+
     def _fit(self, gallery: Gallery, progress: Callable[[int, int], None]) -> None:
         order = sorted(range(len(gallery.labels)), key=lambda i: gallery.labels[i])
         labels = [gallery.labels[i] for i in order]
-        self.labels = tuple(dict.fromkeys(labels))
         first = {label: i for i, label in reversed(list(enumerate(labels)))}
-        self.templates = tuple((label, i - first[label]) for i, label in enumerate(labels))
+        templates = [(label, i - first[label]) for i, label in enumerate(labels)]
         views = Views(self.settings)
         per_template = []
         for done, i in enumerate(order):
             progress(done, len(order))
             per_template.append(self._features(views.of_template(gallery.templates[i])))
+        self._learn(templates, per_template, views.width * views.height)
+        hands = [gallery.hands[i] for i in order] if gallery.hands else []
+        known = [i for i, hand in enumerate(hands) if hand is not None]
+        if {labels[i] for i in known} == set(labels):
+            limits = {
+                "max_distance": self.settings.landmark_max_distance,
+                "min_reach": self.settings.landmark_min_reach,
+            }
+            other = self.by_landmarks = type(self)(self.settings.model_copy(update=limits))
+            rows = [other._shape_features(hand) for i in known if (hand := hands[i]) is not None]
+            other._learn([templates[i] for i in known], rows, 1)
+
+    def _learn(
+        self, templates: list[tuple[str, int]], per_template: list[F32], dimensions: int
+    ) -> None:
+        """Learn samples, sorted by label.
+
+        Args:
+            templates: Label and number of each.
+            per_template: (v, d) features of each one's views.
+            dimensions: The square of a distance is the features' divided by this.
+        """
+        self.templates = tuple(templates)
+        labels = [label for label, _ in templates]
+        self.labels = tuple(dict.fromkeys(labels))
         rows = np.concatenate(per_template)
-        owner = np.repeat(np.arange(len(order)), [len(part) for part in per_template])
-        self._dimensions = views.width * views.height
+        owner = np.repeat(np.arange(len(labels)), [len(part) for part in per_template])
+        self._dimensions = dimensions
         self._mean: F32 = rows.mean(axis=0)
         rows -= self._mean
         self._basis = _principal(rows, self.settings.components)
@@ -153,9 +202,9 @@ class PcaMatcher:
         self._squares: F32 = np.einsum("ij,ij->i", self._rows, self._rows)
         of_template = np.array([self.labels.index(label) for label in labels])
         self._of_template: NDArray[np.intp] = of_template
-        self._starts: NDArray[np.intp] = np.searchsorted(owner, np.arange(len(order)))
+        self._starts: NDArray[np.intp] = np.searchsorted(owner, np.arange(len(labels)))
         ends = np.searchsorted(of_template, np.arange(len(self.labels)), side="right")
-        self._parts = np.split(np.arange(len(order)), ends[:-1])
+        self._parts = np.split(np.arange(len(labels)), ends[:-1])
         self.chart = self._chart()
         if self.settings.calibrate:
             self.max_distance = self._calibrated(owner, of_template)
@@ -235,8 +284,25 @@ class PcaMatcher:
         """
         if not self.labels:
             return Matched(None, {})
-        points = self._coordinates(self._features(views) - self._mean)
-        return self._judge(points, self.labels, self._parts)
+        return self._match_rows(self._features(views))
+
+    def match_photo(self, photo: Extraction) -> Matched:
+        """Match the hand in a photograph: by its landmarks where that can be, else its views."""
+        matched = None if photo.hand is None else self.match_hand(photo.hand)
+        return self(photo.views) if matched is None else matched
+
+    def match_hand(self, hand: HandShape) -> Matched | None:
+        """Match a hand by its landmarks; None where not every gesture has a sample with some."""
+        return self.match_features(self._shape_features(hand))
+
+    def match_features(self, features: F32) -> Matched | None:
+        """The same of (v, d) features that :class:`ShapeFeatures` made with these settings."""
+        if self.by_landmarks is None:
+            return Matched(None, {}) if not self.labels else None
+        return self.by_landmarks._match_rows(features)
+
+    def _match_rows(self, rows: F32) -> Matched:
+        return self._judge(self._coordinates(rows - self._mean), self.labels, self._parts)
 
     def without(self, index: int) -> Matched:
         """Match an enrolled template as if it were shown, itself left out.

@@ -6,17 +6,22 @@ from app.config import PipelineSettings
 from app.pipeline.agreement import Agreement
 from app.pipeline.decode import Decode
 from app.pipeline.hand import FindHand, Stopwatch
+from app.pipeline.hand_landmarks.shape import HandShape, ShapeFeatures
+from app.pipeline.hand_landmarks.stillness import Stillness
+from app.pipeline.hand_landmarks.types import HandLandmarks
 from app.pipeline.match import Matched, PcaMatcher
-from app.pipeline.motion import MotionGate
+from app.pipeline.motion import Motion, MotionGate
 from app.pipeline.palm import Palm
+from app.pipeline.rest import AtRest
 from app.pipeline.roi import RegionOfInterest
 from app.pipeline.template import MakeTemplate
-from app.pipeline.types import U8, Box, Cause, Circle, FrameResult, GestureEvent, WristCut
+from app.pipeline.types import F32, U8, Box, Cause, Circle, FrameResult, GestureEvent, WristCut
 from app.pipeline.views import Views
 from app.pipeline.wrist import WristCrop
 
 STAGES = (
     "decode",
+    "find",
     "choose",
     "channel",
     "smooth",
@@ -32,6 +37,12 @@ STAGES = (
     "match",
 )
 """Names in ``FrameResult.timing_ms``, beside ``total``."""
+NOT_YET: dict[Cause, str] = {
+    "settling": "{} is seen, but the hand has just changed: hold it still",
+    "agreeing": "{} is seen, but not for long enough yet",
+    "doubtful": "{} is seen, but only just like what is taught: show it more clearly",
+}
+"""Why a gesture that is seen does not start with this frame."""
 
 
 class Pipeline:
@@ -44,9 +55,14 @@ class Pipeline:
     def __init__(self, settings: PipelineSettings, matcher: PcaMatcher) -> None:
         self.settings = settings
         self.matcher = matcher
-        self._decode = Decode(settings.decode)
         self._find_hand = FindHand(settings)
+        side = settings.decode.working_side
+        if self._find_hand.by_landmarks:
+            side = max(side, settings.landmarks.working_side)
+        self._decode = Decode(settings.decode.model_copy(update={"working_side": side}))
         self._gate = MotionGate(settings.motion)
+        self._stillness = Stillness(settings.motion)
+        self._shape_features = ShapeFeatures(either_hand=settings.match.either_hand)
         self._crop_wrist = WristCrop(settings.wrist)
         self._find_box = RegionOfInterest(settings.roi)
         self._make_template = MakeTemplate()
@@ -55,7 +71,9 @@ class Pipeline:
 
     def reset(self) -> None:
         """Forget the frames seen and the gesture held, without an event."""
+        self._find_hand.reset()
         self._gate.reset()
+        self._stillness.reset()
         self._agree.reset()
 
     def tick(self, now: float) -> GestureEvent | None:
@@ -78,20 +96,25 @@ class Pipeline:
         digest = zlib.crc32(frame.pixels.data)
         watch.lap("decode")
         held = self._agree.gesture is not None
-        palm = self._find_hand(frame.pixels, watch, held=held)
+        # Where every gesture has landmarks the outline is only shown, and drawn from them.
+        by_outline = self.matcher.by_landmarks is None and bool(self.matcher.labels)
+        palm = self._find_hand(frame.pixels, watch, held=held, mask=by_outline)
+        hand = self._find_hand.hand
+        features = None if hand is None else self._shape_features(HandShape.of([hand]))
         motion = self._gate(palm.piece, now)
+        rest = self._at_rest(motion, hand, features, now)
         watch.lap("motion")
 
         box: Box | None = None
         cut: WristCut | None = None
         template: U8 | None = None
-        matched = Matched(None, {})
+        matched, by_landmarks = Matched(None, {}), False
         cause: Cause | None = None
         reason = self._find_hand.why_none(palm)
         if reason is None:
-            hand, cut = self._crop_wrist(palm)
+            cropped, cut = self._crop_wrist(palm)
             watch.lap("wrist")
-            box = self._find_box(hand)
+            box = self._find_box(cropped)
             watch.lap("roi")
             if box is None:
                 reason = "no hand in the picture: nothing is left above the wrist"
@@ -100,30 +123,35 @@ class Pipeline:
         elif self._find_hand.two_hands(palm):
             cause, reason = "two_hands", "two hands in the picture: show one"
         watch.lap("alone")
-        looked_at = motion.still or motion.trembling or (held and motion.nearly_still)
-        if reason is None and motion.fraction is None:
+        if reason is None and rest.waits:
             cause, reason = "waiting", "waiting for three frames"
-        elif reason is None and not looked_at:
-            cause = "moving"
-            reason = f"hand still moving: {motion.fraction:.1%} of the pixels changed"
+        elif reason is None and not (rest.still or (held and rest.nearly_still)):
+            cause, reason = "moving", rest.why_moving
         elif reason is None and box is not None:
-            template = self._make_template(hand, box)
+            template = self._make_template(cropped, box)
             watch.lap("template")
-            views = self._make_views(whole_or_cut(palm, hand, self.settings))
-            watch.lap("views")
-            matched = self.matcher(views)
+            by_hand = None if features is None else self.matcher.match_features(features)
+            if by_hand is not None:
+                matched, by_landmarks = by_hand, True
+            else:
+                views = self._make_views(whole_or_cut(palm, cropped, self.settings))
+                watch.lap("views")
+                matched = self.matcher(views)
             watch.lap("match")
-            cause, reason = why_unmatched(matched, at_rest=motion.still or motion.trembling)
+            cause, reason = why_unmatched(matched, at_rest=rest.still)
 
         shown = matched.match.gesture if matched.match and matched.match.accepted else None
         strangeness = matched.match.strangeness if matched.match else 1.0
-        event = self._agree(shown, seq, now, strangeness=strangeness, settled=motion.settled)
+        event = self._agree(shown, seq, now, strangeness=strangeness, settled=rest.settled)
+        if shown is not None and self._agree.pending is not None:
+            cause = self._agree.pending
+            reason = NOT_YET[cause].format(shown)
         mismatch = self._gate.mismatch
         scale_x, scale_y = frame.width / palm.piece.shape[1], frame.height / palm.piece.shape[0]
         return FrameResult(
             seq=seq,
             motion=motion.fraction,
-            still=motion.still,
+            still=rest.still,
             roi=scale_box(box, scale_x, scale_y),
             wrist=scale_cut(cut, scale_x, scale_y),
             mask=palm.piece.copy(),
@@ -141,7 +169,18 @@ class Pipeline:
             mismatch=None if mismatch is None else mismatch.copy(),
             palm=None if cause == "no_hand" else scale_palm(palm, scale_x, scale_y),
             look=matched.look,
+            hand=None if hand is None else hand.scaled(frame.width / frame.pixels.shape[1]),
+            by_landmarks=by_landmarks,
         )
+
+    def _at_rest(
+        self, motion: Motion, hand: HandLandmarks | None, features: F32 | None, now: float
+    ) -> AtRest:
+        """Whether the hand rests: by its landmarks where they are known, else by its mask."""
+        if hand is None or features is None:
+            self._stillness.reset()
+            return AtRest.of_mask(motion)
+        return AtRest.of_hand(self._stillness(hand, features, now))
 
 
 def why_unmatched(matched: Matched, *, at_rest: bool) -> tuple[Cause | None, str | None]:

@@ -194,14 +194,15 @@ def two_hands(mask: U8, palm: Palm, least: float) -> bool:
         rest[second.piece > 0] = 0
 
 
+TWO_HANDS = Finding(
+    "two_hands",
+    "there are two hands in the picture, or a thing that looks like one: show one hand "
+    "and nothing else",
+)
+
+
 def _why_two(mask: U8, palm: Palm, settings: QualitySettings) -> Finding | None:
-    if not two_hands(mask, palm, settings.second_hand):
-        return None
-    return Finding(
-        "two_hands",
-        "there are two hands in the picture, or a thing that looks like one: show one hand "
-        "and nothing else",
-    )
+    return TWO_HANDS if two_hands(mask, palm, settings.second_hand) else None
 
 
 def _why_no_wrist(palm: Palm) -> Finding | None:

@@ -12,13 +12,16 @@ from app.errors import ImageRefused, TooLarge, Unreadable
 from app.pipeline import heif
 from app.pipeline.binarise import Binarise
 from app.pipeline.channel import Channel
+from app.pipeline.choose import Choose
 from app.pipeline.formats import ImageInfo, cut_short, read_info
 from app.pipeline.hand import FindHand, Stopwatch, surely_hand
+from app.pipeline.hand_landmarks.live import agrees, silhouette, wanted
+from app.pipeline.hand_landmarks.photo import PhotoHand, find_in_photo
 from app.pipeline.mask import LearnedMask
 from app.pipeline.normalise import Normalise
 from app.pipeline.palm import Palm
 from app.pipeline.pipeline import scale_box, scale_cut, whole_or_cut
-from app.pipeline.quality import Finding, Quality, judge, why_cut_off
+from app.pipeline.quality import TWO_HANDS, Finding, Quality, judge, why_cut_off
 from app.pipeline.roi import RegionOfInterest
 from app.pipeline.smooth import Smooth
 from app.pipeline.template import MakeTemplate
@@ -39,18 +42,21 @@ class Shot(NamedTuple):
     quality: Quality
 
 
-def read_image(data: bytes, settings: PipelineSettings) -> tuple[U8, int, int]:
+def read_image(
+    data: bytes, settings: PipelineSettings, side: int | None = None
+) -> tuple[U8, int, int]:
     """Decode a picture's file, upright and scaled down.
 
     Returns:
-        (h, w, 3) BGR or (h, w, 1) grey, the longer side at most ``still.working_side``; then the
-        width and the height of the whole picture when upright.
+        (h, w, 3) BGR or (h, w, 1) grey, the longer side at most ``side``, by default
+        ``still.working_side``; then the width and the height of the whole picture when upright.
 
     Raises:
         TooLarge: too many bytes.
         Unreadable: not a picture, broken, or too many pixels; judged by its header.
     """
     limits = settings.still
+    side = side or limits.working_side
     if len(data) > limits.max_bytes:
         raise TooLarge(
             f"the file has {len(data)} bytes: at most {limits.max_bytes} are accepted",
@@ -74,17 +80,22 @@ def read_image(data: bytes, settings: PipelineSettings) -> tuple[U8, int, int]:
             height=info.height,
         )
     try:
-        pixels = _pixels(data, info, limits.working_side)
+        pixels = _pixels(data, info, side)
     except (cv2.error, ValueError, RuntimeError, MemoryError):
         raise cut_short() from None
-    scale = limits.working_side / max(pixels.shape[:2])
+    pixels = _upright(_at_most(pixels, side), info.orientation)
+    turned = info.orientation >= 5
+    return pixels, *((info.height, info.width) if turned else (info.width, info.height))
+
+
+def _at_most(pixels: U8, side: int) -> U8:
+    """(h, w, c), scaled down until its longer side has at most so many pixels."""
+    scale = side / max(pixels.shape[:2])
     if scale < 1:
         height, width = pixels.shape[:2]
         size = max(1, round(width * scale)), max(1, round(height * scale))
         pixels = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA).astype(np.uint8)
-    pixels = _upright(pixels.reshape(*pixels.shape[:2], -1), info.orientation)
-    turned = info.orientation >= 5
-    return pixels, *((info.height, info.width) if turned else (info.width, info.height))
+    return pixels.reshape(*pixels.shape[:2], -1)
 
 
 def _pixels(data: bytes, info: ImageInfo, side: int) -> U8:
@@ -186,6 +197,8 @@ def take_shot(data: bytes, settings: PipelineSettings) -> Shot:
     """
     found = _find(data, settings)
     quality = judge(found.pixels, _everything(found, settings), found.palm, settings.quality)
+    if found.seen is not None and found.seen.second and settings.quality.second_hand:
+        _refuse(TWO_HANDS)
     _refuse(quality.problem)
     return Shot(_extract(found, settings), quality)
 
@@ -198,20 +211,49 @@ class _Found(NamedTuple):
     height: int
     palm: Palm
     mode: str
+    seen: PhotoHand | None
 
 
 def _find(data: bytes, settings: PipelineSettings) -> _Found:
-    pixels, width, height = read_image(data, settings)
-    find_hand = FindHand(settings)
+    if not wanted(settings):
+        return _find_by_mask(*read_image(data, settings), settings)
+    fine, width, height = read_image(data, settings, settings.still.landmark_side)
+    pixels = _at_most(fine, settings.still.working_side)
+    seen = find_in_photo(fine, settings.landmarks)
+    if seen is None:
+        if Choose(settings.binarise)(pixels).mode == "threshold":
+            return _find_by_mask(pixels, width, height, settings)
+        _refuse(Finding("no_hand", "no hand found"))
+    assert seen is not None
+    h, w = pixels.shape[:2]
+    drawn = silhouette(seen.hand, (h, w), (w / fine.shape[1], h / fine.shape[0]))
+    # The outline is kept, too: for the paper's way, and for galleries without landmarks.
+    by_mask = _mask_finder(settings)
+    palm = by_mask(pixels, Stopwatch())
+    if by_mask.why_none(palm) is None and agrees(palm, drawn, seen.hand, fine, pixels):
+        return _Found(pixels, width, height, palm, by_mask.way.mode, seen)
+    return _Found(pixels, width, height, drawn, "landmarks", seen)
+
+
+def _mask_finder(settings: PipelineSettings) -> FindHand:
+    alone = settings.landmarks.model_copy(update={"mode": "off"})
+    return FindHand(settings.model_copy(update={"landmarks": alone}))
+
+
+def _find_by_mask(pixels: U8, width: int, height: int, settings: PipelineSettings) -> _Found:
+    find_hand = _mask_finder(settings)
     palm = find_hand(pixels, Stopwatch())
     reason = find_hand.why_none(palm)
     if reason is not None:
         _refuse(Finding("no_hand", reason.replace("no hand in the picture", "no hand found", 1)))
-    return _Found(pixels, width, height, palm, find_hand.way.mode)
+    return _Found(pixels, width, height, palm, find_hand.way.mode, None)
 
 
 def _everything(found: _Found, settings: PipelineSettings) -> U8:
     """(h, w) mask of all that looks like a hand, wherever in the picture it is."""
+    if found.seen is not None:
+        # Whether there is a second hand was asked of the detector.
+        return found.palm.piece
     if found.mode == "learned":
         # The hand's own mask may come from a look at its part of the picture alone.
         height, width = found.palm.piece.shape
@@ -245,4 +287,5 @@ def _extract(found: _Found, settings: PipelineSettings) -> Extraction:
         views=Views(settings.match)(whole_or_cut(palm, hand, settings)),
         width=width,
         height=height,
+        hand=None if found.seen is None else found.seen.shape,
     )

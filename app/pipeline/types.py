@@ -5,10 +5,14 @@ Masks and templates are uint8 arrays that hold 0 and 1. Boxes are ``(x, y, width
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from app.pipeline.hand_landmarks.shape import HandShape
+    from app.pipeline.hand_landmarks.types import HandLandmarks
 
 U8 = NDArray[np.uint8]
 F32 = NDArray[np.float32]
@@ -16,16 +20,27 @@ Box = tuple[int, int, int, int]
 Side = Literal["bottom", "left", "top", "right"]
 Phase = Literal["start", "hold", "end"]
 Cause = Literal[
-    "no_hand", "two_hands", "waiting", "moving", "nothing_enrolled", "unknown_hand", "low_margin"
+    "no_hand",
+    "two_hands",
+    "waiting",
+    "moving",
+    "nothing_enrolled",
+    "unknown_hand",
+    "low_margin",
+    "settling",
+    "agreeing",
+    "doubtful",
 ]
-"""Why a frame shows no gesture, for programs. ``moving`` also stands for a hand that is not known
-while it moves: it may be on its way from one gesture to another."""
+"""Why a frame starts no gesture, for programs. ``moving`` also stands for a hand that is not known
+while it moves: it may be on its way from one gesture to another. With the last three a gesture is
+seen and does not start yet: the hand has changed within the settling time; too few frames have
+shown it; they have shown it too unlike what is taught."""
 
 
 class Way(NamedTuple):
     """How the mask is made, and why so: words that go on from "because"."""
 
-    mode: Literal["threshold", "learned"]
+    mode: Literal["threshold", "learned", "landmarks"]
     why: str
 
 
@@ -123,6 +138,9 @@ class FrameResult:
             None before three frames were sampled.
         palm: In pixels of the frame as sent; None without a hand.
         look: Where the hand lies among what is enrolled; None when nothing was matched.
+        hand: Its landmarks; None where it was found by its mask, or not at all.
+        by_landmarks: Whether it was matched by them: ``match``, ``distances`` and ``look`` are then
+            those of :attr:`PcaMatcher.by_landmarks <app.pipeline.PcaMatcher.by_landmarks>`.
     """
 
     seq: int
@@ -145,6 +163,8 @@ class FrameResult:
     mismatch: U8 | None = None
     palm: Circle | None = None
     look: Look | None = None
+    hand: "HandLandmarks | None" = None
+    by_landmarks: bool = False
 
     def as_message(self, tick: int = 0) -> dict[str, Any]:
         """The ``frame`` message of docs/protocol.md. A match that was not accepted is null."""
@@ -182,6 +202,7 @@ class Extraction:
         views: (v, 80, 60): the template turned and cut in several ways, for matching.
         width: Of the photograph, pixels.
         height: Of the photograph, pixels.
+        hand: Its landmarks without place and size; None where they were not found.
     """
 
     mask: U8
@@ -191,3 +212,4 @@ class Extraction:
     views: U8
     width: int
     height: int
+    hand: "HandShape | None" = None

@@ -81,11 +81,11 @@ class Product:
 
     def learn(self, labels: Sequence[str], hands: Sequence[Any]) -> Ask:
         """Fit the product's matcher."""
-        templates = np.stack([hand.template for hand in hands])
-        matcher = PcaMatcher.fit(Gallery(tuple(labels), templates), self._settings.match)
+        gallery = Gallery.of(list(zip(labels, hands, strict=True)))
+        matcher = PcaMatcher.fit(gallery, self._settings.match)
 
         def ask(hand: Any) -> Answer:
-            match = matcher(hand.views).match
+            match = matcher.match_photo(hand).match
             assert match is not None
             return Answer(match.gesture, match.strangeness)
 

@@ -1,8 +1,8 @@
 """Settings that are compared: the paper as written, and the product's modes."""
 
-from typing import Any, get_args
+from typing import Any
 
-from app.config import BinariseSettings, PipelineSettings
+from app.config import PipelineSettings
 
 ALONE = {"turns": [0.0], "cuts": [], "trims": [0.0], "shears": []}
 PAPER: dict[str, Any] = {
@@ -12,19 +12,13 @@ PAPER: dict[str, Any] = {
 }
 
 
-def mask_modes() -> tuple[str, ...]:
-    """The values of ``binarise.mode``; none in a product that has only the threshold."""
-    field = BinariseSettings.model_fields.get("mode")
-    return get_args(field.annotation) if field else ()
-
-
 def compared() -> dict[str, PipelineSettings]:
-    """Name to settings: the paper, then each mode of the product."""
-    found = mask_modes()
-    threshold = {"mode": "threshold"} if "threshold" in found else {}
+    """Name to settings: the paper, the silhouette by threshold and as it suits, landmarks."""
+    off = {"landmarks": {"mode": "off"}}
     chosen: dict[str, dict[str, Any]] = {
-        "paper": {**PAPER, "binarise": {**PAPER["binarise"], **threshold}},
-        "threshold": {"binarise": threshold},
+        "paper": {**PAPER, "binarise": {**PAPER["binarise"], "mode": "threshold"}},
+        "threshold": {"binarise": {"mode": "threshold"}},
+        "silhouette": off,
+        "landmarks": {"landmarks": {"mode": "on"}},
     }
-    chosen |= {mode: {"binarise": {"mode": mode}} for mode in found if mode != "threshold"}
     return {name: PipelineSettings.model_validate(values) for name, values in chosen.items()}

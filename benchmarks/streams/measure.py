@@ -59,9 +59,13 @@ def to_jpeg(picture: U8) -> bytes:
 def record(
     stream: Iterable[Frame], settings: PipelineSettings, gallery: Gallery, fps: float
 ) -> Iterator[Seen]:
-    """Play a stream through the pipeline with the motion gate open."""
+    """Play a stream through the pipeline with the motion gate open.
+
+    Hands are found by mask: what :func:`decide` makes of a record rests on masks alone.
+    """
     open_gate = settings.motion.model_copy(update={"threshold": 1.0, "held_threshold": 1.0})
-    opened = settings.model_copy(update={"motion": open_gate})
+    by_mask = settings.landmarks.model_copy(update={"mode": "off"})
+    opened = settings.model_copy(update={"motion": open_gate, "landmarks": by_mask})
     pipeline = Pipeline(opened, PcaMatcher.fit(gallery, settings.match))
     for seq, (picture, label) in enumerate(stream):
         result = pipeline(to_jpeg(picture), seq=seq, now=seq / fps)

@@ -8,12 +8,20 @@ import pytest
 
 from app.config import PipelineSettings
 from app.errors import DatabaseBroken, NotFound
-from app.gateway.gallery import DATABASE_FILE, SPARE, LiveGallery
+from app.gateway.gallery import (
+    DATABASE_FILE,
+    SPARE,
+    LiveGallery,
+    build_matcher,
+    starter_set,
+    with_starter,
+)
 from app.gateway.gallery_choice import GalleryChoice
 from app.gateway.learning import fit
 from app.gestures import GestureStore
 from app.gestures.importing import import_entries, plan_of
 from app.gestures.records import SHARED, NewGesture
+from app.gestures.setfile import read_set
 from app.link.actions import Home, Stop
 from app.pipeline import PcaMatcher, extract_template, pack_template
 
@@ -61,10 +69,10 @@ def test_what_was_prepared_is_not_learned_again(
         NewGesture("UP", Home(), (there[1].samples[0].template,)),
         NewGesture("hidden", Home(), (bytes(300) + b"\xff" * 300,), active=False),
     ]
-    pairs = plan_of(there, entries, "replace").after(there)
+    samples = with_starter(plan_of(there, entries, "replace").after(there))
     told: list[tuple[int, int]] = []
-    live.prepared(pairs, fit(pairs, SETTINGS, lambda done, total: told.append((done, total))))
-    assert told == [(done, len(pairs)) for done in range(len(pairs))]
+    live.prepared(samples, fit(samples, SETTINGS, lambda done, total: told.append((done, total))))
+    assert told == [(done, len(samples)) for done in range(len(samples))]
 
     def again(*_: object) -> None:
         raise AssertionError("learned again")
@@ -74,7 +82,7 @@ def test_what_was_prepared_is_not_learned_again(
         import_entries(store, entries, "replace")
         assert live.refresh()
     assert set(live.current.matcher.labels) == {"forward", "stop", "more", "UP"}
-    assert sorted(store.templates()) == sorted(pairs)
+    assert sorted(store.templates()) == sorted((name, bits) for name, bits, _ in samples)
     # Something else than what was prepared is learned.
     store.create("other", Home(), [there[0].samples[0].template])
     assert live.refresh()
@@ -199,3 +207,17 @@ def test_each_gallery_recognises_its_own_hands(
         assert match is not None and match.accepted
         found[gallery] = match.gesture
     assert found == {SHARED: "forward", ann: "up"}
+
+
+def test_a_database_older_than_landmarks_has_those_of_the_starter_set(tmp_path: Path) -> None:
+    folder = starter_set()
+    assert folder is not None
+    store = GestureStore(f"sqlite:///{tmp_path / 'x.db'}", None)
+    for entry in read_set(folder):
+        store.create(entry.name, entry.action, entry.templates)
+    assert all(hand is None for _, _, hand in store.active_samples())
+    assert build_matcher(store, SETTINGS).by_landmarks is not None
+    # One gesture taught without them, and silhouettes are compared.
+    store.create("old", Home(), [bytes(300) + b"\xff" * 300])
+    assert build_matcher(store, SETTINGS).by_landmarks is None
+    store.close()

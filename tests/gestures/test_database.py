@@ -161,7 +161,7 @@ def test_a_newer_database_is_refused_by_its_version(tmp_path: Path) -> None:
     make(path)
     execute(path, "UPDATE alembic_version SET version_num = '0999'")
     message = broken(path)
-    assert "was written by a newer Farhand (its version 0999, this one knows 0004)" in message
+    assert "was written by a newer Farhand (its version 0999, this one knows 0005)" in message
 
 
 def test_tables_that_are_missing_are_noticed(tmp_path: Path) -> None:

@@ -119,9 +119,13 @@ def test_the_example_is_read(folder: Callable[[str], Path]) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("format = 1", "format = 2", "gestures.toml has format 2; this Farhand reads format 1"),
-        ("format = 1", "", "gestures.toml has format None; this Farhand reads format 1"),
-        ("format = 1", "format = true", "has format True; this Farhand reads format 1"),
+        (
+            "format = 1",
+            "format = 3",
+            "gestures.toml has format 3; this Farhand reads formats 1 and 2",
+        ),
+        ("format = 1", "", "gestures.toml has format None; this Farhand reads formats 1 and 2"),
+        ("format = 1", "format = true", "has format True; this Farhand reads formats 1 and 2"),
         ("format = 1", "format = 1\nx = 2", "gestures.toml: unknown key 'x'; allowed are"),
         ("[[gesture]]", "[gesture]", "gestures are written as [[gesture]], with two brackets"),
         ('name = "a"', "", "gesture 1: name is missing, or is not a text"),
@@ -256,3 +260,17 @@ def test_damaged_zips_are_read_or_refused_but_never_crash(
     path.write_bytes(raw)
     with contextlib.suppress(Invalid):
         read_set(path)
+
+
+def test_landmarks_go_out_and_come_back_in_format_2(tmp_path: Path) -> None:
+    hand = bytes((1, 200, *range(252)))
+    entry = NewGesture("wave", Home(), (template(1), template(2)), True, (None, hand))
+    plain = NewGesture("other", Home(), (template(3),))
+    write_set([entry, plain], tmp_path / "set")
+    assert "format = 2" in (tmp_path / "set" / "gestures.toml").read_text()
+    assert read_set(tmp_path / "set") == [entry, plain]
+    write_set([plain], tmp_path / "old")
+    assert "format = 1" in (tmp_path / "old" / "gestures.toml").read_text()
+    (tmp_path / "set" / "wave" / "02.hand").write_bytes(hand[:-1])
+    with pytest.raises(Invalid, match="landmarks 2 have 253 bytes"):
+        read_set(tmp_path / "set")

@@ -14,6 +14,7 @@ from app.gestures.hand.poses import ALSO
 from app.gestures.starter import ACTIONS, VARIANTS, draw_starter_set, starter_pictures
 from app.link.actions import Gripper, Home, JogCartesian, Stop
 from app.pipeline import Gallery, PcaMatcher, extract_template
+from app.pipeline.hand_landmarks.shape import HandShape
 from tests.gestures.conftest import STARTER
 
 PHOTOS = Path(__file__).parents[2].parent / "shared" / "data" / "digits"
@@ -102,12 +103,15 @@ def test_hands_of_strangers_are_read_by_the_drawn_set() -> None:
     """Real hands, none of them enrolled: most are read, and hardly one is taken for another."""
     labels = tuple(name for name, gesture in SET.items() for _ in gesture.templates)
     templates = [pixels(t).reshape(80, 60) for g in SET.values() for t in g.templates]
+    known = [hand for g in SET.values() for hand in g.landmarks]
+    hands = tuple(None if hand is None else HandShape.unpack(hand) for hand in known)
     settings = PipelineSettings()
-    matcher = PcaMatcher.fit(Gallery(labels, np.array(templates)), settings.match)
+    matcher = PcaMatcher.fit(Gallery(labels, np.array(templates), hands), settings.match)
+    assert matcher.by_landmarks is not None
     right = wrong = count = 0
     for digit, name in (("1", "up"), ("2", "forward"), ("4", "back"), ("5", "stop")):
         for photo in sorted((PHOTOS / digit).glob("*.jpg"))[:20]:
-            match = matcher(extract_template(photo.read_bytes(), settings).views).match
+            match = matcher.match_photo(extract_template(photo.read_bytes(), settings)).match
             assert match is not None
             count += 1
             right += match.accepted and match.gesture == name
@@ -125,14 +129,14 @@ def test_the_same_pictures_are_drawn_each_time() -> None:
 def test_drawing_writes_a_set(tmp_path: Path) -> None:
     count = 0
 
-    def fake(data: bytes) -> NDArray[np.uint8]:
+    def fake(data: bytes) -> tuple[NDArray[np.uint8], bytes | None]:
         nonlocal count
         count += 1
         picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
         assert picture.shape == (480, 640, 3)
         template = np.zeros((80, 60), np.uint8)
         template.flat[:count] = 1
-        return template
+        return template, bytes((1, *bytes(253)))
 
     drawn = draw_starter_set(tmp_path / "set", fake)
     assert read_set(tmp_path / "set") == drawn
@@ -143,5 +147,5 @@ def test_drawing_writes_a_set(tmp_path: Path) -> None:
 
 def test_what_is_no_template_is_refused(tmp_path: Path) -> None:
     with pytest.raises(Invalid, match=r"the shape \(80, 60\).*got \(60, 80\)"):
-        draw_starter_set(tmp_path / "set", lambda data: np.zeros((60, 80), np.uint8))
+        draw_starter_set(tmp_path / "set", lambda data: (np.zeros((60, 80), np.uint8), None))
     assert list(tmp_path.iterdir()) == []

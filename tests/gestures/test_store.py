@@ -274,3 +274,27 @@ def test_starter_gestures_may_do_something_else_for_a_robot(tmp_path: Path) -> N
     store = GestureStore(path, STARTER, {"right": turn})
     assert {gesture.name: gesture.action for gesture in store.list()} == actions
     store.close()
+
+
+HAND = bytes((1, 200, *range(252)))
+
+
+def test_landmarks_are_kept_beside_the_template_and_come_along(store: GestureStore) -> None:
+    made = store.create("wave", Home(), [template(1), template(2)], landmarks=[HAND, None])
+    assert [sample.landmarks for sample in made.samples] == [HAND, None]
+    more = store.add_samples(made.id, [template(3)], landmarks=[HAND])
+    assert [sample.landmarks for sample in more.samples] == [HAND, None, HAND]
+    assert store.active_samples() == [
+        ("wave", template(1), HAND),
+        ("wave", template(2), None),
+        ("wave", template(3), HAND),
+    ]
+    other = store.create("other", Home(), [template(4)])
+    _, moved = store.samples.move(made.id, more.samples[0].id, other.id)
+    assert [sample.landmarks for sample in moved.samples] == [None, HAND]
+
+
+@pytest.mark.parametrize("landmarks", [[b"short"], [HAND, HAND], [bytes(254)]])
+def test_what_are_no_landmarks_is_refused(store: GestureStore, landmarks: list[bytes]) -> None:
+    with pytest.raises(Invalid, match="landmarks"):
+        store.create("wave", Home(), [template(1)], landmarks=landmarks)
