@@ -590,10 +590,11 @@ class GatewaySettings(_Section):
         "gallery one",
     )
     work_niceness: int = Field(
-        default=19,
+        default=5,
         ge=0,
         le=19,
-        description="how far those processes stand back behind everything else on the machine",
+        description="how far those processes stand back behind everything else on the machine; "
+        "somebody who teaches a gesture waits for them",
     )
     work_mib: int = Field(
         default=1024,

@@ -27,6 +27,8 @@ MAY_WRITE = {
     "app/gateway/viser_server.py::PrivateServer": "a folder for the socket: the 3D view's thread",
     "app/link/node_end.py::NodeEnd.__init__": BEFORE,
     "app/link/node_end.py::private_folder": BEFORE,
+    "app/pipeline/hand_landmarks/files.py::take_from": "by the command line",
+    "app/pipeline/hand_landmarks/runtime.py::_quiet": "to /dev/null, which never waits",
     "app/robot/beside.py::give_way": "the processes beside the node, when they start",
     "app/robot/latch.py::StopLatch._begin": "the latch's thread, when it begins",
     "app/robot/latch_file.py": "the latch's thread alone, which nobody waits for",

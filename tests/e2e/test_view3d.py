@@ -4,6 +4,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from urllib.parse import quote
 
 import cv2
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from playwright.sync_api import Page
 
 from tests.e2e.conftest import OpenPage
+from tests.e2e.running import run
 from tests.gateway.running import TOKEN, Running, StandIn, running, settings_for, wait_for
 
 pytestmark = pytest.mark.e2e
@@ -44,7 +46,9 @@ def test_the_scene_shows_and_nobody_who_looks_round_is_turned_away(
     wait_for(lambda: scene.shown_tick, "the scene to be built", 60)
     assert scene.server is not None
     page = open_page(f"{server.url}/?token={TOKEN}", camera_allowed=False)
-    address = server.url.replace("http", "ws", 1) + "/viser?view=0123456789abcdef"
+    ticket = run(page, "core/sign-in.js", "return m.ticket();")
+    address = f"{server.url.replace('http', 'ws', 1)}/viser?view=0123456789abcdef"
+    address = quote(f"{address}&ticket={ticket}", safe="")
     page.goto(f"{server.url}/viser/?fixedDpr=1&websocket={address}")
     page.locator("canvas").first.wait_for()
     (client,) = wait_for(lambda: list(scene.server.get_clients().values()), "the camera", 60)

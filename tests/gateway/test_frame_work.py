@@ -10,7 +10,7 @@ import pytest
 from app.gateway import enrolment
 from app.pipeline import FrameResult
 from tests.gateway import held
-from tests.gateway.operating import Hand, rest, show_until, take_and_arm
+from tests.gateway.operating import Hand, rest, show_until
 from tests.gateway.running import Running, StandIn, running, settings_for, wait_for
 
 UPLOADS = 8
@@ -54,12 +54,10 @@ def test_frames_and_a_stop_that_is_shown_go_on_while_uploads_are_worked_on(
     uploads: list[httpx.Response],
 ) -> None:
     with server.operator() as operator, server.operator() as other:
-        take_and_arm(operator)
         rest(operator, hand(None))
         rest(other, hand(None))
-        show_until(operator, hand("left"), lambda frame: frame["gesture"] is not None)
-        wait_for(lambda: node.commands[-1].action, "an action")
-        show_until(other, hand("stop"), lambda frame: frame["gesture"] == "stop")
+        show_until(operator, hand("left"), lambda frame: frame["gesture"] is not None, 60)
+        show_until(other, hand("stop"), lambda frame: frame["gesture"] == "stop", 60)
         wait_for(lambda: node.stops, "the stop")
         operator.next("robot", mode="stopped")
         # The uploads are still worked on, and those that are not bound to end well.
@@ -127,7 +125,7 @@ def test_a_stop_that_is_shown_is_sent_before_anything_else_is_made_of_the_frame(
                 operator.frame(hand("stop"))
                 return bool(node.stops)
 
-            wait_for(shown, "the stop")
+            wait_for(shown, "the stop", 60)
             # Another's frames have another thread.
             other.show(hand(None))
         finally:

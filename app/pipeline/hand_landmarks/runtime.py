@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -50,15 +51,20 @@ class Network:
         return [np.array(output()[0], np.float32) for output in self._outputs]
 
 
+_descriptor = threading.Lock()
+"""Held while descriptor 2 is another one: the later of two at once would put back the wrong one."""
+
+
 @contextlib.contextmanager
 def _quiet() -> Any:
     """LiteRT's native code announces its delegate on standard error; nobody asked for that."""
-    saved = os.dup(2)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 2)
-        yield
-    finally:
-        os.dup2(saved, 2)
-        os.close(saved)
-        os.close(nowhere)
+    with _descriptor:
+        saved = os.dup(2)
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        try:
+            os.dup2(nowhere, 2)
+            yield
+        finally:
+            os.dup2(saved, 2)
+            os.close(saved)
+            os.close(nowhere)
