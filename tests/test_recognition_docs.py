@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.config import PipelineSettings
-from app.pipeline import choose, mask, match, palm
+from app.pipeline import choose, mask, palm, rejection
 from app.pipeline.features import SHAPE_MODEL, SQUASH
 from app.pipeline.network import load
 from benchmarks.ablation import COLUMNS, STEPS, rows
@@ -67,8 +67,8 @@ def test_the_numbers_are_those_of_the_code() -> None:
         f"`wrist.radii` = {settings.wrist.radii} palm radii": settings,
         f"`k` = {settings.match.components} leading": settings,
         f"`s` is {SQUASH} of the view's": settings,
-        f"{match.OWN_REACH} times the distance": match,
-        f"{match.OTHER_REACH} times the median": match,
+        f"{rejection.OWN_REACH} times the distance": rejection,
+        f"{rejection.OTHER_REACH} times the median": rejection,
     }
     missing = [text for text in numbers if text not in TEXT.replace("\n", " ")]
     assert missing == []

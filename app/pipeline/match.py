@@ -2,92 +2,28 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.config import MatchSettings
-from app.errors import Invalid
+from app.pipeline.components import principal
 from app.pipeline.features import Features
+from app.pipeline.gallery import Chart, Gallery, Matched
 from app.pipeline.hand_landmarks.shape import HandShape, ShapeFeatures
-from app.pipeline.template import HEIGHT, WIDTH
-from app.pipeline.types import F32, U8, Cause, Extraction, Look, Match
+from app.pipeline.rejection import TINY, judge, reach
+from app.pipeline.types import F32, U8, Extraction, Look, Match
 from app.pipeline.views import Views
 
-OWN_REACH = 1.3
-OTHER_REACH = 0.9
-"""Factors of the calibration, measured on the digit signs: photographs, and other people's hands
-shown to five photographs a sign (benchmarks/streams)."""
+__all__ = ["Chart", "Gallery", "Matched", "PcaMatcher"]
+
 NEIGHBOURS, SHARE = 5, 0.6
 """Templates of a gesture that its distance is the mean of: the nearest ones, at most so many and at
 most this part of all, since a gesture may be shown in more than one way. On webcam photographs in
 other rooms the nearest alone gave 0.91 with 20 photographs enrolled, the five nearest 0.94."""
 MAX_CALIBRATED = 200
 """Templates that are held against the others to calibrate; more are thinned evenly."""
-TINY = 1e-6
-"""In the unit of the distance; less is nothing."""
-MAX_FITTED = 2000
-"""Views that the principal components are computed from; more are thinned evenly."""
-
-
-@dataclass(frozen=True)
-class Gallery:
-    """The enrolled templates.
-
-    Attributes:
-        labels: One name a template; names repeat.
-        templates: (n, 80, 60) uint8 of 0 and 1.
-        hands: The landmarks of each, None where it has none; or empty for none at all.
-
-    Raises:
-        Invalid: the numbers of labels, templates and hands differ, or the shape is another.
-    """
-
-    labels: tuple[str, ...]
-    templates: U8
-    hands: tuple[HandShape | None, ...] = ()
-
-    def __post_init__(self) -> None:
-        expected = (len(self.labels), HEIGHT, WIDTH)
-        if self.templates.shape != expected:
-            raise Invalid(f"templates of shape {self.templates.shape} where {expected} is needed")
-        if self.hands and len(self.hands) != len(self.labels):
-            raise Invalid(f"{len(self.hands)} hands for {len(self.labels)} templates")
-
-    @classmethod
-    def of(cls, photos: Sequence[tuple[str, Extraction]]) -> Self:
-        """Photographs with their labels; at least one."""
-        templates = np.stack([photo.template for _, photo in photos])
-        hands = tuple(photo.hand for _, photo in photos)
-        return cls(tuple(label for label, _ in photos), templates, hands)
-
-    @classmethod
-    def empty(cls) -> Self:
-        """A gallery without any template."""
-        return cls((), np.zeros((0, HEIGHT, WIDTH), np.uint8))
-
-
-class Matched(NamedTuple):
-    """The nearest gesture, the distance to each, and more; None, {}, None of an empty gallery."""
-
-    match: Match | None
-    distances: dict[str, float]
-    look: Look | None = None
-
-
-class Chart(NamedTuple):
-    """The enrolled templates on the first two principal components, to be drawn.
-
-    Attributes:
-        at: (n, 2) the middle of each template's views, in the order of ``PcaMatcher.templates``.
-        share: (2,) part of all that differs among the enrolled views that each axis shows; 0 for an
-            axis that the gallery is too small to have.
-    """
-
-    at: F32
-    share: F32
 
 
 class PcaMatcher:
@@ -197,7 +133,7 @@ class PcaMatcher:
         self._dimensions = dimensions
         self._mean: F32 = rows.mean(axis=0)
         rows -= self._mean
-        self._basis = _principal(rows, self.settings.components)
+        self._basis = principal(rows, self.settings.components)
         self._rows = self._coordinates(rows)
         self._squares: F32 = np.einsum("ij,ij->i", self._rows, self._rows)
         of_template = np.array([self.labels.index(label) for label in labels])
@@ -219,14 +155,7 @@ class PcaMatcher:
         return Chart(middle, share)
 
     def _calibrated(self, owner: NDArray[np.intp], of_template: NDArray[np.intp]) -> float:
-        """The largest distance accepted, from how the enrolled templates lie to one another.
-
-        With several templates a gesture: a little more than the distance at which nine out of ten
-        find another of their own. With one each: a little less than the median distance to the
-        nearest other gesture. Within the bounds of the settings, and in their middle when a single
-        template says nothing.
-        """
-        low, high = self.settings.min_reach, self.settings.max_distance
+        """The largest distance accepted; see :func:`~app.pipeline.rejection.reach`."""
         count = len(of_template)
         asked = np.unique(np.linspace(0, count - 1, min(count, MAX_CALIBRATED)).astype(np.intp))
         own_to, other_to = [], []
@@ -237,15 +166,7 @@ class PcaMatcher:
             other_to.append(min(others, default=np.inf))
             rest = self._parts[mine][self._parts[mine] != template]
             own_to.append(self._to_gesture(to[rest]) if len(rest) else np.inf)
-        own, other = np.array(own_to), np.array(other_to)
-        own, other = own[np.isfinite(own)], other[np.isfinite(other)]
-        if len(own) >= 2:
-            reach = OWN_REACH * float(np.quantile(own, 0.9))
-        elif len(other):
-            reach = OTHER_REACH * float(np.median(other))
-        else:
-            reach = (low + high) / 2
-        return min(max(reach, min(low, high)), high)
+        return reach(np.array(own_to), np.array(other_to), self.settings)
 
     def _coordinates(self, centred: F32) -> F32:
         """(v, d) centred features to (v, k + 1): components, then the reconstruction error."""
@@ -347,8 +268,9 @@ class PcaMatcher:
             margin = distances[second] - distance
         best_view = int(table[:, parts[best]].min(axis=1).argmin())
         error = float(points[best_view, -1]) / float(np.sqrt(self._dimensions))
-        cause, reason = self._why_unknown(labels[best], distance, second, margin, error)
-        strangeness = self._strangeness(distance, margin, error)
+        strangeness, cause, reason = judge(
+            (labels[best], second), distance, self.max_distance, margin, error, self.settings
+        )
         match = Match(
             labels[best], distance, margin, error, cause is None, reason, strangeness, cause
         )
@@ -357,46 +279,3 @@ class PcaMatcher:
     def match_template(self, template: U8) -> Matched:
         """Match an (80, 60) template of which nothing else is known."""
         return self(Views(self.settings).of_template(template))
-
-    def _strangeness(self, distance: float, margin: float | None, error: float) -> float:
-        """The largest of distance, error and lack of margin, each in parts of what is allowed."""
-        settings = self.settings
-        parts = [distance / max(self.max_distance, TINY), error / max(settings.max_error, TINY)]
-        if margin is not None:
-            parts.append(settings.min_margin / max(margin, TINY))
-        return max(parts)
-
-    def _why_unknown(
-        self, name: str, distance: float, second: str | None, margin: float | None, error: float
-    ) -> tuple[Cause, str] | tuple[None, None]:
-        if distance > self.max_distance:
-            return "unknown_hand", (
-                f"unknown hand: closest is {name}, but too far "
-                f"({distance:.2f}, at most {self.max_distance:.2f})"
-            )
-        if error > self.settings.max_error:
-            return "unknown_hand", (
-                f"unknown hand: closest is {name}, but the shape is unlike any enrolled one "
-                f"({error:.2f}, at most {self.settings.max_error:.2f})"
-            )
-        if margin is not None and margin < self.settings.min_margin:
-            return "low_margin", f"undecided: {name} and {second} are almost equally close"
-        return None, None
-
-
-def _principal(centred: F32, components: int) -> F32:
-    """(n, d) centred rows to the (d, k) leading eigenvectors of their covariance.
-
-    The smaller of the two Gram matrices is decomposed; directions without variance are left out.
-    """
-    sample = centred[:: -(-len(centred) // MAX_FITTED)].astype(np.float64)
-    count, dimensions = sample.shape
-    gram = sample @ sample.T if count < dimensions else sample.T @ sample
-    values, vectors = np.linalg.eigh(gram)
-    values, vectors = values[::-1][:components], vectors[:, ::-1][:, :components]
-    keep = values > max(1e-6 * float(values[0]), 1e-9)
-    values, vectors = values[keep], vectors[:, keep]
-    if count < dimensions:
-        vectors = (sample.T @ vectors) / np.sqrt(values)
-    basis: F32 = np.ascontiguousarray(vectors, np.float32)
-    return basis
