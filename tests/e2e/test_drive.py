@@ -65,7 +65,7 @@ def test_a_hand_shown_to_the_webcam_moves_the_arm_and_the_page_shows_it(
     # It says how the hand is told from the room, and why so.
     page.click("#glass-toggle")
     expect(page.locator("#seen-mask")).to_have_text(
-        re.compile("^(learned mask|plain threshold), because the background ")
+        re.compile("^(hand landmarks$|(learned mask|plain threshold), because the background )")
     )
 
     # When the hand is gone the arm comes to rest by itself, still armed, and nothing is wrong.

@@ -38,6 +38,7 @@ class ByLandmarks:
         self._track = HandTracker(settings)
         self._seen = Tracked(None, False, False, None)
         self.way = Way("landmarks", "")
+        """The same whether or not a hand is seen: nothing else was tried first."""
 
     @classmethod
     def where_wanted(cls, settings: PipelineSettings) -> Self | None:
@@ -67,9 +68,7 @@ class ByLandmarks:
         self._seen = self._track(pixels)
         hand = self._seen.hand
         if hand is None:
-            self.way = Way("landmarks", "no hand is seen that has any")
             return None, shrunk(pixels), None
-        self.way = Way("landmarks", "its joints are seen")
         height, width = pixels.shape[:2]
         shape = mask_shape(height, width)
         return hand, shrunk(pixels), silhouette(hand, shape, (shape[1] / width, shape[0] / height))

@@ -291,7 +291,7 @@ export const texts = Object.freeze({
         modes: {
             threshold: "einfache Schwelle",
             learned: "gelernte Maske",
-            landmarks: "Punkte ihrer Gelenke",
+            landmarks: "Landmarken der Hand",
         },
         modeValue: (way, why) => (why ? `${way}, denn: ${why}` : way),
         rate: "Bilder",

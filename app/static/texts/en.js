@@ -291,7 +291,7 @@ export const texts = Object.freeze({
         modes: {
             threshold: "plain threshold",
             learned: "learned mask",
-            landmarks: "landmarks of its joints",
+            landmarks: "hand landmarks",
         },
         modeValue: (way, why) => (why ? `${way}, because ${why}` : way),
         rate: "Pictures",
