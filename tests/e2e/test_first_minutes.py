@@ -125,7 +125,7 @@ def test_it_can_be_left_at_any_moment_and_goes_on_where_it_was_left(
     expect(title).to_have_text("4 of 10: “right”")
     # Wrong: the sign of another gesture. It is not taken, and it is said why.
     page.evaluate("person.follows = false; person.show('forward')")
-    expect(page.locator(".first-note")).to_contain_text("This looks like “forward”.")
+    expect(page.locator(".first-note")).to_contain_text("That is two fingers: one finger is asked.")
     expect(page.locator("#first-keep")).to_be_visible()
     page.keyboard.press("Escape")
     expect(page.locator("#sheet-first")).to_have_count(0)
