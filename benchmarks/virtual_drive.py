@@ -64,7 +64,8 @@ class VirtualWorld:
     ) -> None:
         self.time = 100.0
         clock = VirtualClock(self)
-        settings = PipelineSettings()
+        # This person is drawn, and MediaPipe's networks know photographs.
+        settings = PipelineSettings.model_validate({"landmarks": {"mode": "off"}})
         self.webcam = LiveWebcam(None, seed, clock=clock)
         self.eyes = Eyes(clock)
         self._lag_s = lag_s

@@ -262,7 +262,7 @@ def test_a_bad_file_changes_nothing_and_says_what_is_wrong(server: Running) -> N
         (b"", "neither a readable folder nor a readable zip file"),
         (b"hello", "neither a readable folder nor a readable zip file"),
         (good[:-30], "neither a readable folder nor a readable zip file"),
-        (zipped("format = 9"), "gestures.toml has format 9; this Farhand reads format 1"),
+        (zipped("format = 9"), "gestures.toml has format 9; this Farhand reads formats 1 and 2"),
         (zipped('format = 1\n[[gesture]]\nname = "x"'), "gesture 1 (x): samples is missing"),
     ):
         job = ended(server, api.post(path, content=body, headers=ZIP))

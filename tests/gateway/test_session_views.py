@@ -1,13 +1,16 @@
 """What a session sees of the recognition when it asks to."""
 
 import base64
+from collections.abc import Iterator
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
+from app.config import PipelineSettings
 from tests.gateway.operating import Hand, show_until
-from tests.gateway.running import Running
+from tests.gateway.running import Running, StandIn, running, settings_for
 
 
 def decode(png: str) -> np.ndarray:
@@ -38,7 +41,16 @@ def test_a_detail_view_brings_masks_and_distances(server: Running, hand: Hand) -
         assert "detail" not in operator.show(hand("home"))
 
 
-def test_the_glass_box_gets_every_step_between(server: Running, hand: Hand) -> None:
+@pytest.fixture
+def by_silhouettes(node: StandIn, folder: Path) -> Iterator[Running]:
+    pipeline = PipelineSettings.model_validate({"landmarks": {"mode": "off"}})
+    settings = settings_for(folder, node.endpoint).model_copy(update={"pipeline": pipeline})
+    with running(settings) as here:
+        yield here
+
+
+def test_the_glass_box_gets_every_step_between(by_silhouettes: Running, hand: Hand) -> None:
+    server = by_silhouettes
     with server.operator() as operator:
         operator.send("view", detail=True, glass=True)
         frame = show_until(

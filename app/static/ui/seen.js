@@ -1,6 +1,6 @@
 // What the server saw in a picture that teaches: drawn over it, and in words.
 
-import { BONES, fitted, fingersOf, pointsIn } from "../core/landmarks.js";
+import { BONES, fitted, fingersOf, pointsIn } from "./landmarks.js";
 import { texts, told } from "../texts/texts.js";
 import { colour } from "./dom.js";
 

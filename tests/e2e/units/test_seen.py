@@ -33,7 +33,7 @@ def test_landmarks_are_drawn_where_the_picture_is(modules: Page) -> None:
     script = (
         "return [m.BONES, m.pointsIn(a, 144, 108), m.pointsIn(a, 144, 200), m.pointsIn(null, 9, 9)]"
     )
-    bones, points, lower, none = run(modules, "core/landmarks.js", script, SEEN)
+    bones, points, lower, none = run(modules, "ui/landmarks.js", script, SEEN)
     assert len(bones) == 20
     assert bones[0] == [0, 1] and bones[4] == [0, 5] and bones[7] == [7, 8]
     assert points[0] == pytest.approx([22.5, 45])
