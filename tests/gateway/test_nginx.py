@@ -101,6 +101,7 @@ def test_signing_in_driving_and_stopping_through_nginx(
             transport=httpx.HTTPTransport(verify=trust),
             base_url=f"https://127.0.0.1:{port}{prefix}",
             headers={"Host": host, "Accept": "text/html"},
+            timeout=120,  # the first picture waits for a process to start
         )
         link.event_hooks["request"].append(
             lambda request: request.extensions.update(sni_hostname=NAME)
