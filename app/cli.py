@@ -108,9 +108,8 @@ def serve(
         robot["profile"] = robot_profile
     if robot:
         given["robot"] = robot
-    if token is not None:
-        log.warning(IN_ARGUMENTS)
-    run_server(settings_for(**given))
+    # Said by the server, whose log waits for nobody.
+    run_server(settings_for(**given), remarks=() if token is None else (IN_ARGUMENTS,))
 
 
 @app.command()

@@ -19,6 +19,8 @@ from benchmarks import estop
 from benchmarks.node_process import Driver
 from benchmarks.observer import FULL_SPEED, STANDSTILL_MS, Observer, tick_now, wait
 from benchmarks.rig import Rig
+from benchmarks.siege import unread_pipe
+from tests.e2e.running import start_server, stop_server
 from tests.unread import PipeReader, Reader, TerminalReader
 
 
@@ -112,3 +114,14 @@ def test_a_node_that_runs_by_itself(reader: Reader, tmp_path: Path) -> None:
     finally:
         node.kill()
         node.wait()
+
+
+def test_a_server_starts_though_its_log_is_full_already(tmp_path: Path) -> None:
+    # It is told at once that a token on the command line is seen by others.
+    with unread_pipe() as full:
+        server = start_server(tmp_path, stderr=full)
+        try:
+            with server.api() as api:
+                assert api.get("/api/health").status_code == 200
+        finally:
+            stop_server(server)

@@ -8,7 +8,7 @@ import logging
 import signal
 import socket
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import FrameType
 
@@ -250,11 +250,15 @@ def lock_data_folder(folder: Path) -> ProcessLock:
     )
 
 
-def serve(settings: Settings) -> None:
+def serve(settings: Settings, remarks: Sequence[str] = ()) -> None:
     """Run the server until it is asked to end by SIGINT or SIGTERM. Main thread only.
 
     Prints one line on standard output once everything runs: the link that signs an operator in. On
     a terminal also one for observers, codes for phones, and how to trust the certificate.
+
+    Args:
+        settings: Of the server.
+        remarks: What its log begins with, as warnings.
 
     Raises:
         CannotStart: the port, the data folder (also when another server has it), the page, the
@@ -263,12 +267,14 @@ def serve(settings: Settings) -> None:
     """
     for name, level in LOG_LEVELS.items():
         logging.getLogger(name).setLevel(level)
-    keep_private()
-    settings = with_given_token(settings)
     # Two frames at once are better than one frame on two cores.
     cv2.setNumThreads(1)
+    # Before anything is said: a server whose log nobody reads has to start, too.
     with logs.written_apart():
-        _serve(settings)
+        for remark in remarks:
+            log.warning(remark)
+        keep_private()
+        _serve(with_given_token(settings))
 
 
 def _serve(settings: Settings) -> None:
