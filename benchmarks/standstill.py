@@ -34,10 +34,10 @@ from websockets.exceptions import ConnectionClosed
 
 from app.gestures.synthetic import Step
 from benchmarks.driving import browser, signal_browser, webcam
-from benchmarks.observer import STANDSTILL_MS, Standstill, tick_now, wait, wait_async
+from benchmarks.observer import STANDSTILL_MS, Observer, Standstill, tick_now, wait, wait_async
 from benchmarks.operator import Operator
 from benchmarks.report import arguments, percentiles, promise, report
-from benchmarks.rig import JOGS, TOKEN, Rig, clip
+from benchmarks.rig import JOGS, TOKEN, Clip, Rig, clip
 from tests.proxy import Proxy
 from tests.slow_link import SlowLink
 
@@ -86,14 +86,7 @@ async def drive_and_fail(rig: Rig, url: str, fail: Fault, mend: Fault) -> Outcom
     observer.forget()
     pictures = clip(rig.next_gesture())
     async with Operator(url, TOKEN) as operator:
-        await operator.take_and_arm()
-        give_up = time.monotonic() + FULL_SPEED_S
-        await operator.play(
-            pictures.shown(),
-            until=lambda: observer.at_full_speed() or time.monotonic() > give_up,
-        )
-        if not observer.at_full_speed():
-            raise NotAtFullSpeed
+        await _reach_full_speed(operator, observer, pictures)
 
         async def keep_showing() -> None:
             with contextlib.suppress(ConnectionClosed):
@@ -117,6 +110,22 @@ async def drive_and_fail(rig: Rig, url: str, fail: Fault, mend: Fault) -> Outcom
     return Outcome(standstill, again)
 
 
+async def _reach_full_speed(operator: Operator, observer: Observer, pictures: Clip) -> None:
+    """Take control, arm, and show the gesture until the arm is at full speed.
+
+    Raises:
+        NotAtFullSpeed: it did not get there in time.
+    """
+    await operator.take_and_arm()
+    give_up = time.monotonic() + FULL_SPEED_S
+    await operator.play(
+        pictures.shown(),
+        until=lambda: observer.at_full_speed() or time.monotonic() > give_up,
+    )
+    if not observer.at_full_speed():
+        raise NotAtFullSpeed
+
+
 def network_blackholed(rig: Rig, proxy: Proxy) -> Outcome:
     """The proxy stops forwarding, and later forwards everything."""
     url = f"http://127.0.0.1:{proxy.port}"
@@ -130,14 +139,7 @@ async def last_frame_queued(rig: Rig, link: SlowLink) -> Outcome:
     observer.forget()
     pictures = clip(rig.next_gesture())
     async with Operator(f"http://127.0.0.1:{link.port}", TOKEN) as operator:
-        await operator.take_and_arm()
-        give_up = time.monotonic() + FULL_SPEED_S
-        await operator.play(
-            pictures.shown(),
-            until=lambda: observer.at_full_speed() or time.monotonic() > give_up,
-        )
-        if not observer.at_full_speed():
-            raise NotAtFullSpeed
+        await _reach_full_speed(operator, observer, pictures)
         link.queue_up(QUEUE_S)
         await asyncio.sleep(0.03)  # what was on its way before has arrived
         sent = tick_now()
